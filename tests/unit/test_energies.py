@@ -8,7 +8,7 @@ import tmm
 
 import velatura as vt
 from velatura import tables
-from velatura.model.solved.energies.adding import indices, layers, leaving, parts
+from velatura.model.solved.energies.adding import Leaving, indices, layers, parts
 from velatura.model.solved.energies.energies import Energies, energies
 from velatura.model.solved.energies.interfaces import Setting
 from velatura.model.solved.energies.modes import Even, Relative
@@ -206,8 +206,8 @@ def test_modes_of_the_azimuth_agree_on_isotropic_stacks(often: bool) -> None:
     total = []
     for basis in (Relative(nodes), Even(nodes)):
         setting = Setting(basis, p, 0 * p, 377, tables.load() if often else None)
-        light = leaving([last for _, last in layers(found, setting)], setting)
-        total.append(sum(light.energy(each) for each in light.reflected))
+        light = Leaving.of([last for _, last in layers(found, setting)], setting)
+        total.append(sum(light.energies.reflected))
     assert total[1] == pytest.approx(total[0], abs=4e-3)
 
 
@@ -228,8 +228,8 @@ def test_interfaces_that_mirror_light_keep_cosines_from_sines(often: bool) -> No
     for mirrored in (True, False):
         basis = Even(nodes, (2, 4), 4, mirrored)
         setting = Setting(basis, p, 0 * p + 0.4, 89, tables.load() if often else None)
-        light = leaving([last for _, last in layers(found, setting)], setting)
-        total.append(sum(light.energy(each) for each in light.reflected))
+        light = Leaving.of([last for _, last in layers(found, setting)], setting)
+        total.append(sum(light.energies.reflected))
     assert Even.of(nodes, [(4.0, 0.0), (5.0, np.pi / 2)]).mirrored and not Even.of(nodes, [(4.0, 0.3)]).mirrored
     assert total[0] == pytest.approx(total[1], abs=1e-12)
 

@@ -9,9 +9,12 @@ out, a layer that reflects R and transmits T adds
 
 from __future__ import annotations
 
-from collections.abc import Callable, Hashable, Sequence
+import functools
+import operator
+from collections.abc import Callable, Hashable, Iterator, Sequence
 from dataclasses import dataclass
-from typing import Any
+from functools import cached_property
+from typing import Any, NamedTuple, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,11 +25,12 @@ from velatura.films.tables import Coated
 from velatura.model.rough_interface import KEPT, Facets, colours
 from velatura.model.solved.energies.interfaces import Setting, interface
 from velatura.model.solved.energies.media import Slab, medium
-from velatura.model.solved.energies.operators import Layer, Operator
+from velatura.model.solved.energies.operators import Functional, Layer, Operator
 from velatura.stack import InterfaceValues, Material, SlabValues
 from velatura.stack.chain import chain
 
 Array = NDArray[np.floating]
+Leaver = TypeVar("Leaver", Operator, Functional)
 
 
 @dataclass(frozen=True)
@@ -40,41 +44,80 @@ class Lambert:
 Part = Facets | Slab | Lambert
 
 
-@dataclass(frozen=True)
-class Leaving:
-    """Light that leaves a stack lit from above: for each layer from the top what it is the deepest one to reflect; what
-    passes all of them, and of that what no layer has reflected.
+class Sorted(NamedTuple):
+    """Light that leaves a stack: for each layer what it is the deepest one to reflect; what passes all of them, and of
+    that what no layer has reflected.
     """
 
-    reflected: tuple[Operator, ...]
-    passed: Operator
-    straight: Operator
+    reflected: Sequence[Array]
+    passed: Array
+    straight: Array
+
+
+@dataclass(frozen=True)
+class Leaving:
+    """Light that leaves a stack lit from above, by its energy or at the nodes.
+
+    Attributes:
+        stack: the layers from the top.
+        below: what all above a layer throws back down, of each but the first.
+        bounces: the sum of all reflections between both.
+    """
+
+    stack: Sequence[Layer]
+    below: Sequence[Operator]
+    bounces: Sequence[Operator]
     setting: Setting
 
-    def energy(self, light: Operator) -> Array:
+    @classmethod
+    def of(cls, stack: Sequence[Layer], setting: Setting) -> Leaving:
+        """Sum up layers from the top."""
+        first, *others = stack
+        below, bounces = [first.r_below], list[Operator]()
+        for each in others:
+            bounces.append((below[-1] @ each.r).repeated())
+            # model.md, Eq. 3
+            below.append(each.r_below + each.t @ bounces[-1] @ (below[-1] @ each.t_below))
+        return cls(stack, below[:-1], bounces, setting)
+
+    @cached_property
+    def energies(self) -> Sorted:
         """Energies (C, M) of beams."""
-        basis = self.setting.basis
-        return np.asarray(basis.energy(light.columns) + light.beams[..., 0, 0, :])
-
-
-def leaving(stack: Sequence[Layer], setting: Setting) -> Leaving:
-    """Sum up layers from the top."""
-    first, *others = stack
-    reflected, d, straight, out, below = [first.r], first.t, first.t, first.t_below, first.r_below
-    for each in others:
-        bounces = (below @ each.r).repeated()
+        energy = Functional.energy(self.setting.basis.counted, len(self.setting.p))
+        first, *others = self.stack
         # model.md, Eq. 2
-        reflected.append(out @ each.r @ bounces @ d)
-        d, straight = each.t @ bounces @ d, each.t @ straight
-        # model.md, Eq. 3
-        out = out @ (each.r @ below).repeated() @ each.t_below
-        below = each.r_below + each.t @ bounces @ below @ each.t_below
-    return Leaving(tuple(reflected), d, straight, setting)
+        reflected = [
+            out @ each.r @ met for out, each, met in zip(self._outward(energy @ first.t_below), others, self.bounces)
+        ]
+        deeper = energy
+        for shallower, each, met in reversed([*zip(reflected, others, self.bounces)]):
+            deeper = Functional.together([shallower, deeper @ each.t @ met])
+        straight = functools.reduce(operator.matmul, [each.t for each in reversed(self.stack)], energy)
+        *found, passed, straightly = Functional.together([energy @ first.r, deeper @ first.t, straight]).outcomes
+        return Sorted(found, passed, straightly)
+
+    @cached_property
+    def lights(self) -> Sorted:
+        """Light (C, F, n, M) at the nodes that was in beams."""
+        first, *others = self.stack
+        reflected, light, straight = [first.r.columns], first.t.light, first.t.light
+        for out, each, bounces in zip(self._outward(first.t_below), others, self.bounces):
+            met = bounces @ light
+            reflected.append((out @ (each.r @ met)).columns)
+            light, straight = each.t @ met, each.t @ straight
+        return Sorted(reflected, light.columns, straight.columns)
+
+    def _outward(self, out: Leaver) -> Iterator[Leaver]:
+        """What becomes of light that each layer but the first reflects, given that of light from below the first."""
+        for each, below, bounces in zip(self.stack[1:], self.below, self.bounces):
+            yield out
+            # model.md, Eq. 3: (1 - R below)^-1 is 1 + R (1 - below R)^-1 below
+            out = (out + out @ each.r @ bounces @ below) @ each.t_below
 
 
 def layers(found: Sequence[Part], setting: Setting) -> list[tuple[Layer, Layer]]:
     """What each layer does to light, where facets are met once, and as the setting says."""
-    return [_layer(part, of) for part, of in zip(found, settings(found, setting))]
+    return [layer(part, of) for part, of in zip(found, settings(found, setting))]
 
 
 def settings(found: Sequence[Part], setting: Setting) -> list[Setting]:
@@ -83,19 +126,28 @@ def settings(found: Sequence[Part], setting: Setting) -> list[Setting]:
     return [setting.dark if any(ends[:i]) else setting for i in range(len(found))]
 
 
-def _layer(part: Part, setting: Setting) -> tuple[Layer, Layer]:
-    """A layer, kept for other materials that have one like it."""
-
-    def make() -> tuple[Layer, Layer]:
-        if isinstance(part, Facets):
-            return interface(part, setting)
-        alike = medium(part, setting) if isinstance(part, Slab) else _lambert(part, setting)
-        return alike, alike
+def layer(part: Part, setting: Setting) -> tuple[Layer, Layer]:
+    """A layer where facets are met once, and as the setting says, kept for other materials that have one like it."""
 
     def key(value: Any) -> Hashable:
         return value.key if isinstance(value, Coated) else None if value is None else np.asarray(value).tobytes()
 
-    return KEPT.once((type(part), *map(key, vars(part).values()), setting.key), make)
+    def made() -> tuple[Layer, Layer]:
+        basis = setting.basis
+        if basis.symmetric is basis or (isinstance(part, Facets) and part.alpha_u != part.alpha_v):
+            return _made(part, setting)
+        once, often = layer(part, setting.symmetric)
+        spread = once.map(lambda x: basis.of_symmetric(x, setting.phi))
+        return spread, spread if often is once else often.map(lambda x: basis.of_symmetric(x, setting.phi))
+
+    return KEPT.once((type(part), *map(key, vars(part).values()), setting.key), made)
+
+
+def _made(part: Part, setting: Setting) -> tuple[Layer, Layer]:
+    if isinstance(part, Facets):
+        return interface(part, setting)
+    alike = medium(part, setting) if isinstance(part, Slab) else _lambert(part, setting)
+    return alike, alike
 
 
 def _lambert(part: Lambert, setting: Setting) -> Layer:

@@ -8,9 +8,7 @@ inside a denser medium. What the first system reflects besides is the remainder.
 
 from __future__ import annotations
 
-import functools
-import operator
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -25,16 +23,15 @@ from velatura.model.solved.energies.adding import (
     Part,
     indices,
     interfaces,
+    layer,
     layers,
-    leaving,
     parts,
     settings,
 )
 from velatura.model.solved.energies.interfaces import Setting
-from velatura.model.solved.energies.media import Slab, medium
+from velatura.model.solved.energies.media import Slab
 from velatura.model.solved.energies.modes import Basis, Even, Relative
 from velatura.model.solved.energies.nodes import Nodes
-from velatura.model.solved.energies.operators import Operator
 from velatura.model.solved.guards import TINY
 from velatura.stack import InterfaceValues, LayerValues, Material
 from velatura.tables import Tables
@@ -107,39 +104,35 @@ def energies(
     cosines = np.concatenate([cos_theta, np.tile(incidences, len(azimuths))])
     around = np.concatenate([np.broadcast_to(phi, np.shape(cos_theta)), np.repeat(azimuths, len(incidences))])
     nodes = Nodes.of(indices(everything), NODES, like)
-    basis: Basis = Even.of(nodes, brushed) if brushed else Relative(nodes, MODES if len(incidences) else 1)
+    orders = tuple(range(MODES if len(incidences) else 1))
+    basis: Basis = Even.of(nodes, brushed) if brushed else Relative(nodes, orders)
     setting = Setting(basis, np.sqrt(np.maximum(1 - cosines * cosines, 0)), around, samples, often)
 
     # Sum up the systems
     scatters = any(isinstance(part, Slab) and part.tau_s.any() for part in everything)
     each = layers(everything, setting)
-    full = leaving([last for _, last in each], setting)
+    full = Leaving.of([last for _, last in each], setting)
 
     def system(found: Sequence[Part], as_set: bool = False) -> Leaving:
         of = settings(found, setting)
-        kept = [medium(part, x) if isinstance(part, Slab) else of_it[as_set] for part, x, of_it in zip(found, of, each)]
-        return leaving(kept, setting)
+        met = zip(found, of, each)
+        return Leaving.of([layer(x, y)[0] if isinstance(x, Slab) else of_it[as_set] for x, y, of_it in met], setting)
 
     clear = _ended(parts(material, lambda g: 0.0))
     sharp = system(clear) if scatters or often else full
     kept = system(_ended(parts(material, forward))) if scatters else sharp
     # A lobe has all that media do not scatter where nothing above it refracts, and else a share of it
     whole = system(clear, True) if scatters and often else full
-    shares = _undisturbed(everything)
-    more = [_kept(share, whole.reflected[i], sharp.reflected[i], full) for i, share in shares.items()]
 
     # Sort what leaves
-    total = _sum(full.reflected)
-    reflected = np.maximum(full.energy(total), 0)
-
-    def of_lobes(system: Leaving) -> list[Operator]:
-        found = [system.reflected[i] + each for i, each in zip(shares, more)]
-        return found or [Operator.nothing(basis.size, len(setting.p))]
-
-    unscattered, veiled = (
-        np.maximum(np.broadcast_arrays(*map(full.energy, of_lobes(system)), reflected)[:-1], 0)
-        for system in (sharp, kept)
-    )
+    shares = _undisturbed(everything)
+    places = [*shares]
+    once, of_kept, of_whole = (np.array(x.energies.reflected)[places] for x in (sharp, kept, whole))
+    again = of_whole - once
+    taken = _taken(np.array([*shares.values()])[:, None, None], again, once)
+    reflected = np.maximum(sum(full.energies.reflected), 0)
+    shape = len(shares), *reflected.shape
+    unscattered, veiled = (np.maximum(np.broadcast_to(x + taken * again, shape), 0) for x in (once, of_kept))
     # No lobe has more than there is: what quadrature says beyond is its error
     share = np.minimum(reflected / np.maximum(veiled.sum(axis=0), TINY), 1)
     lobes, veils = unscattered * share, np.maximum(veiled - unscattered, 0) * share
@@ -147,20 +140,18 @@ def energies(
     count = np.size(cos_theta)
     if brushed and len(incidences):
         by_node = _of_isotropic(material, rest[:, count:], often, forward, incidences, samples, like)
+    elif len(incidences):
+        in_lobes = zip(places, taken[:, :, None, None])
+        by_node = tuple(light[..., count:] for light in _by_node(full, sharp, kept, whole, in_lobes))
     else:
-        lights = (
-            total.columns - _sum(of_lobes(kept)).columns,
-            *(x.passed.columns - sharp.straight.columns for x in (full, sharp)),
-        )
-        by_node = tuple(light[..., count:] for light in lights)
-    straight = sharp.energy(sharp.straight)
+        by_node = (np.zeros((1, 1, nodes.count, 0)),) * 3
     return Energies(
         lobes=lobes[..., :count],
         veils=veils[..., :count],
         rest=rest[:, :count],
-        straight=straight[:, :count],
-        bounced=np.maximum(sharp.energy(sharp.passed) - straight, 0)[:, :count],
-        passed=np.maximum(full.energy(full.passed), 0)[:, :count],
+        straight=sharp.energies.straight[:, :count],
+        bounced=np.maximum(sharp.energies.passed - sharp.energies.straight, 0)[:, :count],
+        passed=np.maximum(full.energies.passed, 0)[:, :count],
         remainder=by_node[0],
         around=by_node[1],
         again=by_node[2],
@@ -195,17 +186,24 @@ def _undisturbed(found: Sequence[Part]) -> dict[int, float]:
     return shares
 
 
-def _kept(share: float, all_light: Operator, once: Operator, leaving: Leaving) -> Operator:
-    """A share of the light of an interface that meets its facets again: no more than a lobe takes, without a kink."""
-    again = all_light + -1.0 * once
-    most = fitted.AGAIN * np.maximum(leaving.energy(once), TINY) / np.maximum(leaving.energy(again), TINY)
+def _taken(share: Array, again: Array, once: Array) -> Array:
+    """Share of the light of interfaces that meets their facets again which lobes take: no more than they have, `once`,
+    without a kink."""
+    most = fitted.AGAIN * np.maximum(once, TINY) / np.maximum(again, TINY)
     ratio = np.minimum(most, share) / np.maximum(most, share)
-    kept = (np.minimum(most, share) * (1 + ratio**fitted.AGAIN_POWER) ** (-1 / fitted.AGAIN_POWER))[:, None, None]
-    return replace(again, columns=kept * again.columns, beams=kept * again.beams)
+    return np.asarray(np.minimum(most, share) * (1 + ratio**fitted.AGAIN_POWER) ** (-1 / fitted.AGAIN_POWER))
 
 
-def _sum(lights: Sequence[Operator]) -> Operator:
-    return functools.reduce(operator.add, lights)
+def _by_node(
+    full: Leaving, sharp: Leaving, kept: Leaving, whole: Leaving, in_lobes: Iterable[tuple[int, Array]]
+) -> tuple[Array, Array, Array]:
+    """Light at the nodes that no lobe has, that passes not straight, and that passes so without scattering media;
+    `in_lobes` says of each layer with a lobe what share of light that meets facets again the lobe takes."""
+    of_full, of_sharp, of_kept, of_whole = (x.lights for x in (full, sharp, kept, whole))
+    remainder: Array = sum(of_full.reflected, np.zeros(()))
+    for i, taken in in_lobes:
+        remainder = remainder - of_kept.reflected[i] - taken * (of_whole.reflected[i] - of_sharp.reflected[i])
+    return remainder, of_full.passed - of_sharp.straight, of_sharp.passed - of_sharp.straight
 
 
 def _of_isotropic(

@@ -55,6 +55,11 @@ class Setting:
         return KEPT.once((key, type(self.basis), self.basis.deposits, self.samples, self.often), make)
 
     @property
+    def symmetric(self) -> Setting:
+        """The setting for layers that look alike all around."""
+        return replace(self, basis=self.basis.symmetric, phi=0 * self.phi)
+
+    @property
     def dark(self) -> Setting:
         """The setting without beams."""
         return replace(self, p=self.p[:0], phi=self.phi[:0])
@@ -127,9 +132,9 @@ class _Met:
     @classmethod
     def of(cls, facets: Facets, p: Array, psi: Array, setting: Setting) -> _Met:
         """Once for interfaces that are alike but for their rotation and the unit of momentum."""
-        basis, nodes = setting.basis, setting.basis.nodes
+        nodes = setting.basis.nodes
         if facets.alpha_u == facets.alpha_v and (lengths := np.unique(p)).shape < p.shape:
-            return cls.of(facets, lengths, 0 * lengths, setting)._around(np.searchsorted(lengths, p), psi, basis)
+            return cls.of(facets, lengths, 0 * lengths, setting)._of_some(np.searchsorted(lengths, p))
         unit = nodes.ends[-1]
         momenta = (np.round(np.asarray(x) / unit, DIGITS).tobytes() for x in (p, nodes.ends))
         key = facets.key(unit), *momenta, psi.tobytes()
@@ -157,19 +162,11 @@ class _Met:
             second = [second[0], second[1] + second[2]]
         return cls(lights[0], None if facets.opaque or facets.final else lights[1], shares, tuple(second))
 
-    def _around(self, places: NDArray[np.integer], psi: Array, basis: Basis) -> _Met:
-        """The sources of numbers `places`, which isotropic facets met at the azimuth 0, at others."""
-        return self._of_some(places, lambda light: basis.around(light, psi))
-
-    def _of_some(
-        self, sources: slice | NDArray[np.integer], turned: Callable[[Array], Array] = lambda light: light
-    ) -> _Met:
+    def _of_some(self, sources: slice | NDArray[np.integer]) -> _Met:
         """Some of the sources of isotropic facets, whose second events are not looked at."""
-        reflected, refracted = (
-            None if x is None else turned(x[..., sources]) for x in (self.reflected, self.refracted)
-        )
-        assert reflected is not None
-        return _Met(reflected, refracted, FirstShares(*(x[:, sources] for x in vars(self.shares).values())))
+        refracted = None if self.refracted is None else self.refracted[..., sources]
+        shares = FirstShares(*(x[:, sources] for x in vars(self.shares).values()))
+        return _Met(self.reflected[..., sources], refracted, shares)
 
 
 @dataclass(frozen=True)

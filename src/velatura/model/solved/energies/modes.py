@@ -1,8 +1,8 @@
 """Modes of the azimuth of light.
 
-Stacks of isotropic interfaces treat every mode by itself, relative to the azimuth that light came with (`Relative`).
-In others (`Even`), modes 0 and 2 act on one another; odd ones do not act on energies, since a stack does not
-distinguish a direction from its opposite.
+Layers that look alike all around treat every mode by itself, relative to the azimuth that light came with
+(`Relative`). In stacks with brushed interfaces (`Even`), modes act on one another, but odd ones not on energies, since
+a stack does not distinguish a direction from its opposite.
 """
 
 from __future__ import annotations
@@ -19,6 +19,7 @@ from scipy.sparse import csc_array
 from velatura import ops
 from velatura.model.rough_interface import Light, Scatter
 from velatura.model.solved.energies.nodes import STENCIL, Nodes
+from velatura.model.solved.energies.operators import Operator
 from velatura.model.solved.guards import MOMENTUM_MIN
 from velatura.ops import Value
 from velatura.renderer import compiled
@@ -108,9 +109,14 @@ class Basis(ABC):
         found[:, :, 1] += sign * found[:, :, -1]
         return np.asarray(found[:, :, :-1])
 
+    @property
     @abstractmethod
-    def around(self, light: Array, psi: Array) -> Array:
-        """What was deposited for sources at the azimuth 0, with all turned to azimuths (sources,)."""
+    def symmetric(self) -> Relative:
+        """The modes of layers that look alike all around."""
+
+    @abstractmethod
+    def of_symmetric(self, layer: Operator, phi: Array) -> Operator:
+        """An operator of the `symmetric` modes, for beams at azimuths phi (M,)."""
 
     @abstractmethod
     def operators(self, light: Array, rotation: float) -> Array:
@@ -137,26 +143,27 @@ class Basis(ABC):
     def diagonal(self, values: Array) -> Array:
         """Matrices that scale light at the nodes by (C, N)."""
 
-    @abstractmethod
-    def energy(self, measure: Array) -> Array:
-        """Energies (C, sources) of measures."""
+    @property
+    def counted(self) -> Array:
+        """Energies (n,) of the coefficients of the first family."""
+        return np.repeat([1.0, 0.0], [self.nodes.count, self.size - self.nodes.count])
 
 
 @dataclass(frozen=True)
 class Relative(Basis):
-    """The modes cos(m phi), m = 0 to `count` - 1, each a family of its own, for isotropic interfaces.
+    """The modes cos(m phi), each a family of its own, for layers that look alike all around.
 
-    phi is relative to the azimuth of the source.
+    phi is relative to the azimuth of the source; `orders`, m, begin with 0 and rise.
     """
 
     nodes: Nodes
-    count: int = 1
+    orders: tuple[int, ...] = (0,)
 
     azimuths = np.zeros(1)
 
     @property
     def deposits(self) -> Hashable:
-        return self.nodes.cells, self.count
+        return self.nodes.cells, self.orders
 
     @property
     def size(self) -> int:
@@ -166,14 +173,21 @@ class Relative(Basis):
         return np.zeros_like(phi)
 
     def angular(self, cosine: Value, sine: Value) -> list[Value]:
-        return [1.0, cosine, 2 * cosine * cosine - 1][: self.count]
+        waves = [1.0, cosine]
+        while len(waves) <= self.orders[-1]:
+            waves.append(2 * cosine * waves[-1] - waves[-2])
+        return [waves[m] for m in self.orders]
 
     @property
     def odd(self) -> list[bool]:
-        return [m % 2 == 1 for m in range(self.count)]
+        return [m % 2 == 1 for m in self.orders]
 
-    def around(self, light: Array, psi: Array) -> Array:
-        return light
+    @property
+    def symmetric(self) -> Relative:
+        return self
+
+    def of_symmetric(self, layer: Operator, phi: Array) -> Operator:
+        return layer
 
     def columns(self, light: Array, rotation: float) -> Array:
         return light
@@ -184,28 +198,24 @@ class Relative(Basis):
         return values[:, None]
 
     def outer(self, emitted: Array, taken: Array) -> Array:
-        found = np.zeros((len(emitted), self.count, self.nodes.count, taken.shape[-1]))
+        found = np.zeros((len(emitted), len(self.orders), self.nodes.count, taken.shape[-1]))
         found[:, 0] = emitted[:, 0, :, None] * taken.reshape(len(taken), 1, -1)
         return found
 
     def swung(self, light: Array, swing: float, there: Array, here: Array, phi: Array | None = None) -> Array:
         both = np.multiply.outer(there, here)
-        waves = [0.5 * swing * both**m * light[:, 0] for m in range(1, self.count)]
+        waves = [0.5 * swing * (both**m if m < 3 else 0 * both) * light[:, 0] for m in self.orders[1:]]
         return np.stack([light[:, 0], *waves], axis=1)
 
     def diagonal(self, values: Array) -> Array:
         return values[:, None, :, None] * np.eye(self.nodes.count)
 
-    def energy(self, measure: Array) -> Array:
-        return np.asarray(measure[:, 0].sum(axis=-2))
-
 
 @dataclass(frozen=True)
 class Even(Basis):
-    """Modes 1, sqrt(2) cos(m phi), sqrt(2) sin(m phi) of the azimuth, m = 2, 4, ..., modes first.
+    """Modes 1, sqrt(2) cos(m phi), sqrt(2) sin(m phi) of the azimuth, m = 2, 4, ..., of one family, modes first.
 
-    Where all interfaces mirror light about the tangent (`mirrored`), cosines and sines do not act on one another: two
-    families, the second with a mode that is never lit in the place of the constant. Else they are one.
+    Where all interfaces mirror light about the tangent (`mirrored`), sines do not act on energies, and are left out.
     Sources meet an interface at azimuths of one quarter of a turn: its axes mirror the others.
     """
 
@@ -224,15 +234,20 @@ class Even(Basis):
 
     @property
     def deposits(self) -> Hashable:
-        return self.nodes.cells, self.orders, self.quarter
+        return self.nodes.cells, self.orders, self.quarter, self.mirrored
+
+    @property
+    def waves(self) -> list[tuple[int, bool]]:
+        """Orders of all modes but the first, and whether they are sines."""
+        return [(m, sine) for m in self.orders for sine in ((False,) if self.mirrored else (False, True))]
 
     @property
     def modes(self) -> int:
-        return 1 + 2 * len(self.orders)
+        return 1 + len(self.waves)
 
     @property
     def size(self) -> int:
-        return (1 + len(self.orders) if self.mirrored else self.modes) * self.nodes.count
+        return self.modes * self.nodes.count
 
     def relative(self, phi: Array, rotation: float) -> Array:
         return phi - rotation
@@ -243,22 +258,31 @@ class Even(Basis):
 
     def angular(self, cosine: Value, sine: Value) -> list[Value]:
         turn = cosine * cosine - sine * sine, 2 * cosine * sine
-        waves = [turn]
+        turns = [turn]
         for _ in self.orders[1:]:
-            c, s = waves[-1]
-            waves.append((c * turn[0] - s * turn[1], c * turn[1] + s * turn[0]))
-        return [1.0, *(ROOT * part for wave in waves for part in wave)]
+            c, s = turns[-1]
+            turns.append((c * turn[0] - s * turn[1], c * turn[1] + s * turn[0]))
+        return [1.0, *(ROOT * turns[self.orders.index(m)][sine] for m, sine in self.waves)]
 
     @property
     def odd(self) -> list[bool]:
         return [False] * self.modes
 
-    def around(self, light: Array, psi: Array) -> Array:
-        found = [light[:, 0]]
-        for i, m in enumerate(self.orders):
-            c, s, cosine, sine = np.cos(m * psi), np.sin(m * psi), light[:, 2 * i + 1], light[:, 2 * i + 2]
-            found += [c * cosine - s * sine, s * cosine + c * sine]
-        return np.stack(found, axis=1)
+    @property
+    def symmetric(self) -> Relative:
+        return Relative(self.nodes, (0, *self.orders))
+
+    def of_symmetric(self, layer: Operator, phi: Array) -> Operator:
+        orders = self.symmetric.orders
+        families = [0, *(orders.index(m) for m, _ in self.waves)]
+        each, columns = (
+            np.broadcast_to(x, (len(x), len(orders), *x.shape[2:]))[:, families] for x in (layer.nodes, layer.columns)
+        )
+        nodes = np.zeros((len(each), self.modes, self.nodes.count, self.modes, self.nodes.count))
+        for k in range(self.modes):
+            nodes[:, k, :, k] = each[:, k]
+        columns = columns * self._basis(phi)[:, None] if columns.shape[-1] else columns
+        return Operator(nodes.reshape(-1, 1, self.size, self.size), self._sorted(columns), layer.beams)
 
     def columns(self, light: Array, rotation: float) -> Array:
         found = self._turned(rotation).T @ light.reshape(len(light), self.modes, -1)
@@ -269,17 +293,16 @@ class Even(Basis):
         found = light.reshape(-1, modes, n, len(azimuths), n)
         matrix = self._basis(azimuths) @ found / len(azimuths)
         # Cosines and sines do not mix, by the mirror symmetry of the axes
-        sine = np.arange(modes) % 2 == 0
-        sine[0] = False
-        matrix *= (sine[:, None] == sine)[None, :, None, :, None]
+        if not self.mirrored:
+            matrix *= (self._sines[:, None] == self._sines)[None, :, None, :, None]
         turn = self._turned(rotation).T
         matrix = turn @ (turn @ matrix.reshape(-1, modes, n * modes * n)).reshape(-1, modes * n, modes, n)
-        return self._diagonal(matrix.reshape(-1, modes, n, modes, n))
+        return matrix.reshape(-1, 1, self.size, self.size)
 
     def rows(self, values: Array, rotation: float) -> Array:
         each = values.reshape(len(values), len(self.azimuths), self.nodes.count)
         basis = self._basis(self.azimuths)
-        basis[2::2] = 0
+        basis[self._sines] = 0
         projected = np.einsum("cqn,bq->cbn", each, basis) / len(self.azimuths)
         return np.asarray(np.einsum("ax,can->cxn", self._turned(rotation), projected))
 
@@ -291,45 +314,30 @@ class Even(Basis):
 
     def swung(self, light: Array, swing: float, there: Array, here: Array, phi: Array | None = None) -> Array:
         count, colours = self.nodes.count, len(light)
-        waves = [0.5 * swing * np.multiply.outer(there, here) ** 2 * light[:, 0, :count, : len(here)]] * 2
+        wave = 0.5 * swing * np.multiply.outer(there, here) ** 2 * light[:, 0, :count, : len(here)]
+        of_second = [k for k, (m, _) in enumerate(self.waves, 1) if m == 2]
         if phi is not None:
-            waves = [ROOT * wave(2 * phi) * each for wave, each in zip((np.cos, np.sin), waves)]
             lit = np.zeros((colours, self.modes, count, len(here)))
-            lit[:, 1], lit[:, 2] = waves
+            lit[:, of_second] = self._basis(phi)[of_second, None] * wave[:, None]
             return light + self._sorted(lit)
         matrix = np.zeros((colours, self.modes, count, self.modes, count))
-        matrix[:, 1, :, 1], matrix[:, 2, :, 2] = waves
-        return light + self._diagonal(matrix)
+        for k in of_second:
+            matrix[:, k, :, k] = wave
+        return light + matrix.reshape(light.shape)
 
     def diagonal(self, values: Array) -> Array:
-        families = 2 if self.mirrored else 1
-        found = np.tile(values, self.size // self.nodes.count)[:, None, :, None] * np.eye(self.size)
-        return np.asarray(np.repeat(found, families, axis=1))
-
-    def energy(self, measure: Array) -> Array:
-        return np.asarray(measure[:, 0, : self.nodes.count].sum(axis=-2))
+        return np.asarray(np.tile(values, self.modes)[:, None, :, None] * np.eye(self.size))
 
     def _sorted(self, light: Array) -> Array:
-        """Light (C, modes, N, M) by family, (C, families, n, M)."""
-        if not self.mirrored:
-            return light.reshape(len(light), 1, self.size, -1)
-        sines = np.concatenate([0 * light[:, :1], light[:, 2::2]], axis=1)
-        found = np.stack([np.concatenate([light[:, :1], light[:, 1::2]], axis=1), sines], axis=1)
-        return found.reshape(len(light), 2, self.size, -1)
+        """Light (C, modes, N, M) of one family, (C, 1, n, M)."""
+        return light.reshape(len(light), 1, self.size, -1)
 
-    def _diagonal(self, matrix: Array) -> Array:
-        """Matrices (C, modes, N, modes, N) by family, (C, families, n, n)."""
-        if not self.mirrored:
-            return matrix.reshape(len(matrix), 1, self.size, self.size)
-        count, n = 1 + len(self.orders), self.nodes.count
-        found = np.zeros((len(matrix), 2, count, n, count, n))
-        cosines = [0, *range(1, self.modes, 2)]
-        found[:, 0] = matrix[:, cosines][:, :, :, cosines]
-        found[:, 1, 1:, :, 1:] = matrix[:, 2::2, :, 2::2]
-        return found.reshape(len(matrix), 2, self.size, self.size)
+    @property
+    def _sines(self) -> NDArray[np.bool_]:
+        return np.array([False, *(sine for _, sine in self.waves)])
 
     def _basis(self, azimuth: Array) -> Array:
-        waves = [ROOT * wave(m * azimuth) for m in self.orders for wave in (np.cos, np.sin)]
+        waves = [ROOT * (np.sin if sine else np.cos)(m * azimuth) for m, sine in self.waves]
         return np.stack([np.ones_like(azimuth), *waves])
 
     def _turned(self, rotation: float) -> Array:
@@ -337,7 +345,10 @@ class Even(Basis):
         found = np.eye(self.modes)
         for i, m in enumerate(self.orders):
             c, s = np.cos(m * rotation), np.sin(m * rotation)
-            found[2 * i + 1 : 2 * i + 3, 2 * i + 1 : 2 * i + 3] = [[c, s], [-s, c]]
+            if self.mirrored:
+                found[i + 1, i + 1] = c
+            else:
+                found[2 * i + 1 : 2 * i + 3, 2 * i + 1 : 2 * i + 3] = [[c, s], [-s, c]]
         return found
 
 

@@ -8,7 +8,8 @@ operator that beams do not reach, below the first rough interface, is made for n
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -39,6 +40,11 @@ class Operator:
     def of(cls, nodes: Array, columns: Array) -> Operator:
         """An operator that leaves nothing in a beam."""
         return cls(nodes, columns, np.zeros((1, 1, 1, columns.shape[-1])))
+
+    @property
+    def light(self) -> Operator:
+        """What becomes of beams alone."""
+        return replace(self, nodes=self.nodes[..., :0])
 
     def __matmul__(self, first: Operator) -> Operator:
         nodes, columns = _product(self.nodes, first.nodes), _product(self.nodes, first.columns)
@@ -84,6 +90,44 @@ def _inverse(matrix: Array) -> Array:
 
 
 @dataclass(frozen=True)
+class Functional:
+    """Shares of light that K outcomes have: of the first family at the nodes (C, K, n), and of beams (C, K, M)."""
+
+    nodes: Array
+    beams: Array
+
+    @classmethod
+    def energy(cls, counted: Array, beams: int) -> Functional:
+        """All energy: of light at the nodes what is `counted` (n,)."""
+        return cls(counted[None, None], np.ones((1, 1, beams)))
+
+    def __matmul__(self, first: Operator) -> Functional:
+        nodes, beams = self.nodes @ first.nodes[:, 0], self.nodes @ first.columns[:, 0]
+        if self.beams.shape[-1] and first.columns.shape[-1]:
+            beams = beams + self.beams * first.beams[:, 0]
+        return Functional(nodes, beams)
+
+    @property
+    def outcomes(self) -> Iterator[Array]:
+        """Shares (C, M) of beams by outcome."""
+        return iter(self.beams.swapaxes(0, 1))
+
+    def __add__(self, other: Functional) -> Functional:
+        return Functional(self.nodes + other.nodes, self.beams + other.beams)
+
+    @classmethod
+    def together(cls, found: Sequence[Functional]) -> Functional:
+        """All outcomes of some."""
+        return cls(*(_joined([getattr(each, name) for each in found], axis=1) for name in ("nodes", "beams")))
+
+
+def _joined(arrays: Sequence[Array], axis: int) -> Array:
+    """Arrays joined along an axis, of as many colours as the one of the most."""
+    colours = max(len(each) for each in arrays)
+    return np.concatenate([np.broadcast_to(each, (colours, *each.shape[1:])) for each in arrays], axis=axis)
+
+
+@dataclass(frozen=True)
 class Layer:
     """What a layer, or a stack of layers, does to light from above (`r`, `t`) and to light from below."""
 
@@ -94,3 +138,8 @@ class Layer:
 
     def reversed(self) -> Layer:
         return Layer(self.r_below, self.t_below, self.r, self.t)
+
+    def map(self, change: Callable[[Operator], Operator]) -> Layer:
+        r, t = change(self.r), change(self.t)
+        alike = self.r_below is self.r and self.t_below is self.t
+        return Layer(r, t, r, t) if alike else Layer(r, t, change(self.r_below), change(self.t_below))
