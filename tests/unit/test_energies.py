@@ -59,6 +59,13 @@ def test_a_step_of_an_index_keeps_the_number_of_nodes() -> None:
     assert Nodes.of([1.0, 1.301, 1.3], 24, like) == Nodes.of([1.0, 1.301, 1.3], 24)
 
 
+def test_many_media_share_nodes() -> None:
+    """Each part between two indices has four nodes at least: those of many media would have too many."""
+    many = [1.0, *np.linspace(1.05, 2.5, 30).tolist()]
+    assert Nodes.of(many, 24).count < 1.7 * Nodes.of(many[:4], 24).count
+    assert Nodes.of(many, 24).ends[-1] == 2.5
+
+
 # Smooth interfaces
 
 

@@ -31,15 +31,15 @@ MOST_REST = 4.0  # for the remainder
 
 
 def factors(
-    solved: Solved, wi: Direction, shares: Shares, count: int, samples: int | None
+    solved: Solved, wi: Direction, shares: Shares, count: int, samples: int | None, share: float
 ) -> tuple[list[list[Array]], list[Demand]]:
     """Squares of the factors, (C, M) at nodes wi, of each reflected part of a side and then of what passes; and by side
     the weights of samples of reflected parts.
 
     `solved` is that of NumPy in the symmetric form, with the weights of the forward form; `shares` interpolates between
-    the nodes; `samples` are those at each node, None for as many as a single material may take.
+    the nodes; `samples` are those at each node, None for a `share` of as many as a single material may take.
     """
-    samples = samples or next(each for least, each in reversed(SAMPLES.items()) if count > least)
+    samples = samples or round(share * next(each for least, each in reversed(SAMPLES.items()) if count > least))
     i = tuple(low_discrepancy.repeated(x, samples) for x in wi)
     u = low_discrepancy.at_nodes(count, samples, None)
     nodes = np.repeat(np.arange(count), samples)

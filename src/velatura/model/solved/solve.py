@@ -45,6 +45,7 @@ Array = NDArray[np.floating]
 
 RGB = 3
 NORMALS = {True: 1597, False: 987}  # over which lobes are integrated, of isotropic materials and of others
+MANY = 4  # interfaces, beyond which each meets fewer samples
 FINELY = 1597, 4181  # facets, and as NORMALS, for differences, whose error is that of values over a step
 BETWEEN = {True: 144, False: 89}  # as NORMALS, for each place of a renderer's grid
 NARROW = 0.05  # roughness of lobes whose integrals have edges between directions, as those of interfaces do
@@ -225,7 +226,7 @@ class Solver:
         found = [replace(each, columns=replace(each.columns, scale=0 * each.columns.scale + 1)) for each in found]
         numbers, folded = self.body(material, found, layouts), Folded.of(self.grid.coarser(material), material)
         factors, wanted = reciprocal_balance.factors(
-            numbers, folded.directions, folded.shares, folded.count, self.samples
+            numbers, folded.directions, folded.shares, folded.count, self.samples, _few(1.0, material)
         )
 
         def spread(values: Array) -> Array:
@@ -282,7 +283,7 @@ class Solver:
         lobes = self._lobes(material, layout, folded, light)
         clipped, peak = _clipped(polynomial, folded.at_cosines)
         whole = polynomial.albedo(folded.cosine) + folded.around(clipped)
-        drawn, rest = self._hand_over(layout, folded, light, lobes, whole)
+        drawn, rest = self._hand_over(material, layout, folded, light, lobes, whole)
         scale = _scale(rest, whole)
         wanted = [*(each.wanted for each in drawn), Demand.of(rest + ENERGY_EPS, rest, scale * folded.around(peak))]
         transmission = self.transmission(_uncoloured(material), layout)
@@ -331,12 +332,18 @@ class Solver:
         return [_Lobe(shape, tensor(spec)) for shape, spec in zip(shapes, layout.lobes)]
 
     def _hand_over(
-        self, layout: Layout, folded: Folded | Listed, light: Energies, lobes: Sequence[_Lobe], whole: Array
+        self,
+        material: Material,
+        layout: Layout,
+        folded: Folded | Listed,
+        light: Energies,
+        lobes: Sequence[_Lobe],
+        whole: Array,
     ) -> tuple[list[_Weighed], Array]:
         """Divide energies of lobes by their integrals; the remainder takes what light it can, by which a lobe would be
         too bright, and has the energy that is returned. `whole` is its albedo without a scale."""
         rest, drawn, apart = light.rest, [], {each.interface for each in layout.lobes if each.veil}
-        normals = self.normals or (FINELY[1] if self.finely else NORMALS[self.isotropic])
+        normals = self.normals or (FINELY[1] if self.finely else round(_few(NORMALS[self.isotropic], material)))
         for (shape, tensor), spec in zip(lobes, layout.lobes):
             lobe = shape.lobe(1.0, tensor.roughness(folded.phi))
             z, squares, largest = refracted_lobe.integrals(lobe, folded.directions, normals)
@@ -546,6 +553,11 @@ def _cloudy(material: Material) -> set[int]:
 def sides(material: Material) -> list[Material]:
     """A material as it is seen from above and, where it transmits, from below."""
     return [material, material.reversed()] if material.transmits else [material]
+
+
+def _few(samples: float, material: Material) -> float:
+    """Count of samples, less where a stack has many interfaces, so that its time stays bounded."""
+    return samples * min(1.0, MANY / max(len(material.interfaces), 1))
 
 
 def _reflects_all(found: Sequence[Part]) -> bool:

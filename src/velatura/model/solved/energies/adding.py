@@ -76,9 +76,10 @@ class Leaving:
         below, bounces = [first.r_below], list[Operator]()
         for each in others:
             bounces.append((below[-1] @ each.r).repeated())
-            # model.md, Eq. 3
-            below.append(each.r_below + each.t @ bounces[-1] @ (below[-1] @ each.t_below))
-        return cls(stack, below[:-1], bounces, setting)
+            if each is not stack[-1]:
+                # model.md, Eq. 3
+                below.append(each.r_below + each.t @ bounces[-1] @ (below[-1] @ each.t_below))
+        return cls(stack, below, bounces, setting)
 
     @cached_property
     def energies(self) -> Sorted:

@@ -101,7 +101,7 @@ def interface(facets: Facets, setting: Setting) -> tuple[Layer, Layer]:
 def scaled(share: Callable[[Array], Array], setting: Setting) -> Operator:
     """An operator that changes no direction, but scales light by shares (C, ...) for lengths of momentum."""
     nodes = setting.basis.diagonal(share(setting.basis.nodes.p))
-    return Operator(nodes, np.zeros((1, 1, nodes.shape[-1], len(setting.p))), share(setting.p)[:, None, None])
+    return Operator(nodes, np.zeros((1, 1, nodes.rows, len(setting.p))), share(setting.p)[:, None, None])
 
 
 @dataclass(frozen=True)

@@ -18,6 +18,7 @@ from scipy.sparse import csc_array
 
 from velatura import ops
 from velatura.model.rough_interface import Light, Scatter
+from velatura.model.solved.energies.matrices import Blocks
 from velatura.model.solved.energies.nodes import STENCIL, Nodes
 from velatura.model.solved.energies.operators import Operator
 from velatura.model.solved.guards import MOMENTUM_MIN
@@ -139,9 +140,9 @@ class Basis(ABC):
         """Light of `outer` that goes on in the direction that it came in, by the sines `there` (N,) and `here`: with
         1 + swing (s cos(phi) + s^2 cos(2 phi)), s being their product. Of beams `phi` are the azimuths."""
 
-    @abstractmethod
-    def diagonal(self, values: Array) -> Array:
+    def diagonal(self, values: Array) -> Blocks:
         """Matrices that scale light at the nodes by (C, N)."""
+        return Blocks.diagonal(np.tile(values, self.size // self.nodes.count)[:, None])
 
     @property
     def counted(self) -> Array:
@@ -206,9 +207,6 @@ class Relative(Basis):
         both = np.multiply.outer(there, here)
         waves = [0.5 * swing * (both**m if m < 3 else 0 * both) * light[:, 0] for m in self.orders[1:]]
         return np.stack([light[:, 0], *waves], axis=1)
-
-    def diagonal(self, values: Array) -> Array:
-        return values[:, None, :, None] * np.eye(self.nodes.count)
 
 
 @dataclass(frozen=True)
@@ -275,14 +273,18 @@ class Even(Basis):
     def of_symmetric(self, layer: Operator, phi: Array) -> Operator:
         orders = self.symmetric.orders
         families = [0, *(orders.index(m) for m, _ in self.waves)]
-        each, columns = (
-            np.broadcast_to(x, (len(x), len(orders), *x.shape[2:]))[:, families] for x in (layer.nodes, layer.columns)
-        )
-        nodes = np.zeros((len(each), self.modes, self.nodes.count, self.modes, self.nodes.count))
-        for k in range(self.modes):
-            nodes[:, k, :, k] = each[:, k]
+
+        def by_mode(values: Array) -> Array:
+            return np.broadcast_to(values, (len(values), len(orders), *values.shape[2:]))[:, families]
+
+        if isinstance(layer.nodes, Blocks):
+            values = by_mode(layer.nodes.values)
+            nodes = Blocks(values.reshape(len(values), 1, -1, *values.shape[-2:]))
+        else:
+            nodes = Blocks(by_mode(layer.nodes)[:, None])
+        columns = by_mode(layer.columns)
         columns = columns * self._basis(phi)[:, None] if columns.shape[-1] else columns
-        return Operator(nodes.reshape(-1, 1, self.size, self.size), self._sorted(columns), layer.beams)
+        return Operator(nodes, self._sorted(columns), layer.beams)
 
     def columns(self, light: Array, rotation: float) -> Array:
         found = self._turned(rotation).T @ light.reshape(len(light), self.modes, -1)
@@ -324,9 +326,6 @@ class Even(Basis):
         for k in of_second:
             matrix[:, k, :, k] = wave
         return light + matrix.reshape(light.shape)
-
-    def diagonal(self, values: Array) -> Array:
-        return np.asarray(np.tile(values, self.modes)[:, None, :, None] * np.eye(self.size))
 
     def _sorted(self, light: Array) -> Array:
         """Light (C, modes, N, M) of one family, (C, 1, n, M)."""

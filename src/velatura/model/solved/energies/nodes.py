@@ -21,10 +21,20 @@ from velatura.ops import Value
 Array = NDArray[np.floating]
 
 CLOSE = 1.04  # ratio of indices that share an end
+PARTS = 8  # at most: media that lie closer share an end where there are more
 SHORT = 1.01  # ratio of the ends of a part at least
 INNER = 0.6  # share of nodes below the lowest index
 STENCIL = 4
 QUADRATURE = 4000
+
+
+def _apart(indices: Sequence[float], close: float) -> list[int]:
+    """Numbers of indices from the lowest that lie apart by a ratio."""
+    found: list[int] = []
+    for k in sorted(range(len(indices)), key=indices.__getitem__):
+        if not found or indices[k] >= indices[found[-1]] * close:
+            found.append(k)
+    return found
 
 
 @dataclass(frozen=True)
@@ -40,10 +50,10 @@ class Nodes:
         part, so that results do not jump from one to the other, unless that leaves a part too short."""
         if like is None or len(like) != len(indices):
             like = indices
-        media: list[int] = []
-        for k in sorted(range(len(like)), key=like.__getitem__):
-            if not media or like[k] >= like[media[-1]] * CLOSE:
-                media.append(k)
+        media, close = _apart(like, CLOSE), CLOSE
+        while len(media) > PARTS:
+            close *= CLOSE
+            media = _apart(like, close)
         ends, known = ([0.0, *(float(n[k]) for k in media[:-1]), float(max(n))] for n in (indices, like))
         if any(b < a * SHORT for a, b in pairwise(ends[1:])):
             return cls.of(indices, count)

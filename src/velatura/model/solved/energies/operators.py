@@ -14,79 +14,64 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from velatura.model.solved.energies.matrices import (
+    Blocks,
+    Matrix,
+    applied,
+    composed,
+    family,
+    product,
+    repeated,
+    scaled,
+    total,
+)
 from velatura.model.solved.guards import TRAPPED
 
 Array = NDArray[np.floating]
 
-ALONE = 2**18  # multiplications that OpenBLAS leaves to one thread
-LARGE = 100  # rows of a matrix of which it shares the inverse among threads
-
 
 @dataclass(frozen=True)
 class Operator:
-    """`nodes` (C, F, n, n), what becomes of light at the nodes; of beams, `columns` (C, F, n, M) and `beams` (C, 1, 1,
-    M), for C colours, or 1 for all, and F independent families of modes.
+    """`nodes`, a matrix (C, F, n, n), what becomes of light at the nodes; of beams, `columns` (C, F, n, M) and `beams`
+    (C, 1, 1, M), for C colours, or 1 for all, and F independent families of modes.
     """
 
-    nodes: Array
+    nodes: Matrix
     columns: Array
     beams: Array
 
     @classmethod
     def nothing(cls, n: int, beams: int) -> Operator:
-        return cls.of(np.zeros((1, 1, n, n)), np.zeros((1, 1, n, beams)))
+        return cls.of(Blocks.diagonal(np.zeros((1, 1, n))), np.zeros((1, 1, n, beams)))
 
     @classmethod
-    def of(cls, nodes: Array, columns: Array) -> Operator:
+    def of(cls, nodes: Matrix, columns: Array) -> Operator:
         """An operator that leaves nothing in a beam."""
         return cls(nodes, columns, np.zeros((1, 1, 1, columns.shape[-1])))
 
     @property
     def light(self) -> Operator:
         """What becomes of beams alone."""
-        return replace(self, nodes=self.nodes[..., :0])
+        return replace(self, nodes=self.columns[..., :0])
 
     def __matmul__(self, first: Operator) -> Operator:
-        nodes, columns = _product(self.nodes, first.nodes), _product(self.nodes, first.columns)
+        nodes, columns = product(self.nodes, first.nodes), applied(self.nodes, first.columns)
         if self.columns.shape[-1] and first.columns.shape[-1]:
             return Operator(nodes, columns + self.columns * first.beams, self.beams * first.beams)
         return Operator.of(nodes, columns)
 
     def __add__(self, other: Operator) -> Operator:
-        return Operator(self.nodes + other.nodes, self.columns + other.columns, self.beams + other.beams)
+        return Operator(total(self.nodes, other.nodes), self.columns + other.columns, self.beams + other.beams)
 
     def __rmul__(self, share: float) -> Operator:
-        return Operator(share * self.nodes, share * self.columns, share * self.beams)
+        return Operator(scaled(self.nodes, share), share * self.columns, share * self.beams)
 
     def repeated(self, trapped: float = TRAPPED) -> Operator:
         """The sum of all of its powers, (1 - A)^-1, with a share lost each time."""
         # No light reaches what smooth interfaces trap for ever
-        inverse = _inverse((1 + trapped) * np.eye(self.nodes.shape[-1]) - self.nodes)
+        inverse = repeated(self.nodes, trapped)
         beams = 1 / np.maximum(1 - self.beams, trapped)
-        return Operator(inverse, _product(inverse, self.columns) * beams, beams)
-
-
-def _product(nodes: Array, columns: Array) -> Array:
-    """Matrix products, block by block: larger ones BLAS would share among threads, which wait for a busy machine."""
-    width = max(ALONE // nodes[0, 0].size, 1)
-    count = columns.shape[-1]
-    if count <= width:
-        return np.asarray(nodes @ columns)
-    return np.concatenate([nodes @ columns[..., k : k + width] for k in range(0, count, width)], axis=-1)
-
-
-def _inverse(matrix: Array) -> Array:
-    """Inverses, by blocks where LAPACK would share one among threads."""
-    half = matrix.shape[-1] // 2
-    if 2 * half < LARGE:
-        return np.asarray(np.linalg.inv(matrix))
-    (a, b), (c, d) = ((rows[..., :half], rows[..., half:]) for rows in (matrix[..., :half, :], matrix[..., half:, :]))
-    first = _inverse(a)
-    there, back = _product(first, b), _product(c, first)
-    last = _inverse(d - _product(c, there))
-    right = -_product(there, last)
-    upper = np.concatenate([first - _product(right, back), right], axis=-1)
-    return np.concatenate([upper, np.concatenate([-_product(last, back), last], axis=-1)], axis=-2)
+        return Operator(inverse, applied(inverse, self.columns) * beams, beams)
 
 
 @dataclass(frozen=True)
@@ -102,7 +87,7 @@ class Functional:
         return cls(counted[None, None], np.ones((1, 1, beams)))
 
     def __matmul__(self, first: Operator) -> Functional:
-        nodes, beams = self.nodes @ first.nodes[:, 0], self.nodes @ first.columns[:, 0]
+        nodes, beams = (composed(self.nodes[:, None], x)[:, 0] for x in (family(first.nodes), first.columns[:, :1]))
         if self.beams.shape[-1] and first.columns.shape[-1]:
             beams = beams + self.beams * first.beams[:, 0]
         return Functional(nodes, beams)
