@@ -11,7 +11,7 @@ from velatura import tables
 from velatura.model.solved.energies.adding import Leaving, indices, layers, parts
 from velatura.model.solved.energies.energies import Energies, energies
 from velatura.model.solved.energies.interfaces import Setting
-from velatura.model.solved.energies.modes import Even, Relative
+from velatura.model.solved.energies.modes import RATIOS, Even, Relative
 from velatura.model.solved.energies.nodes import Nodes
 from velatura.optics import fresnel, ggx
 from velatura.stack import Diffuse, Interface, Material, Medium, Stack
@@ -233,12 +233,33 @@ def test_interfaces_that_mirror_light_keep_cosines_from_sines(often: bool) -> No
     nodes, p = Nodes.of(indices(found), 24), np.sqrt(1 - COSINES**2)
     total = []
     for mirrored in (True, False):
-        basis = Even(nodes, (2, 4), 4, mirrored)
+        basis = Even(nodes, (2, 4), mirrored)
         setting = Setting(basis, p, 0 * p + 0.4, 89, tables.load() if often else None)
         light = Leaving.of([last for _, last in layers(found, setting)], setting)
         total.append(sum(light.energies.reflected))
     assert Even.of(nodes, [(4.0, 0.0), (5.0, np.pi / 2)]).mirrored and not Even.of(nodes, [(4.0, 0.3)]).mirrored
     assert total[0] == pytest.approx(total[1], abs=1e-12)
+
+
+@pytest.mark.parametrize("ratio", RATIOS)
+def test_modes_of_the_azimuth_fade_in(ratio: tuple[float, float]) -> None:
+    """Where they begin, and where they are whole."""
+    for end in ratio:
+        across = [0.3 / end * (1 + step) for step in (-1e-9, 1e-9)]
+        stacks = [Stack([COAT, Interface(**GOLD, alpha=[0.3, alpha], rotation=30)]) for alpha in across]
+        here, there = (reflected(solved(stack, phi=0.2)) for stack in stacks)
+        assert there == pytest.approx(here, abs=1e-7)
+
+
+@pytest.mark.parametrize("ratio", [1.0, 1.41, 1.6, 1.8, 4.5, 9.0, 12.0])
+def test_azimuths_hold_modes_apart(ratio: float) -> None:
+    """Means over them of products of modes."""
+    basis = Even.of(Nodes.of([1.0], 24), [(ratio, 0.0)])
+    azimuths, weights = basis.rule
+    assert weights.sum() == pytest.approx(1, abs=1e-12) and (weights > 0).all()
+    orders = 2 * np.arange(2 * len(basis.orders) + 1)
+    means = [weights @ np.cos(order * azimuths) for order in orders]
+    assert means == pytest.approx([1.0, *(0 * orders[1:])], abs=1e-12)
 
 
 # Walks

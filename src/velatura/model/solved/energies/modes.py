@@ -1,8 +1,9 @@
 """Modes of the azimuth of light.
 
 Layers that look alike all around treat every mode by itself, relative to the azimuth that light came with
-(`Relative`). In stacks with brushed interfaces (`Even`), modes act on one another, but odd ones not on energies, since
-a stack does not distinguish a direction from its opposite.
+(`Relative`). In stacks with brushed interfaces (`Even`), even modes act on one another; odd ones do not act on
+energies, since a stack does not distinguish a direction from its opposite. The more an interface is brushed the more
+modes it needs; each one fades in, so that light does not jump.
 """
 
 from __future__ import annotations
@@ -10,6 +11,7 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from collections.abc import Hashable, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -28,7 +30,8 @@ from velatura.renderer.low_discrepancy import fibonacci
 
 Array = NDArray[np.floating]
 
-RATIOS = (1.8, 5.0, 10.0)  # of two roughnesses, from which one more order of the azimuth is needed
+#: Ratios of two roughnesses from which one more order of the azimuth fades in, and from which it is needed as a whole.
+RATIOS = ((1.4, 1.8), (4.0, 5.0), (8.0, 10.0))
 SQUARE = 1e-6  # of a right angle, within which two axes are at one
 ROOT = float(np.sqrt(2))
 
@@ -214,25 +217,27 @@ class Even(Basis):
     """Modes 1, sqrt(2) cos(m phi), sqrt(2) sin(m phi) of the azimuth, m = 2, 4, ..., of one family, modes first.
 
     Where all interfaces mirror light about the tangent (`mirrored`), sines do not act on energies, and are left out.
-    Sources meet an interface at azimuths of one quarter of a turn: its axes mirror the others.
+    Sources meet an interface at azimuths of one quarter of a turn: its axes mirror the others. Of the highest order and
+    of the last azimuth there is a share `last`.
     """
 
     nodes: Nodes
     orders: tuple[int, ...] = (2,)
-    quarter: int = 3
     mirrored: bool = False
+    last: float = 1.0
 
     @classmethod
     def of(cls, nodes: Nodes, brushed: Sequence[tuple[float, float]]) -> Even:
         """The modes for interfaces of such ratios of their roughnesses, at least 1, and rotations."""
-        count = 1 + sum(max(ratio for ratio, _ in brushed) > each for each in RATIOS)
+        most = max(ratio for ratio, _ in brushed)
+        faded = [(most - low) / (high - low) for low, high in RATIOS if most > low]
         turns = [rotation / (np.pi / 2) for _, rotation in brushed]
         mirrored = bool(np.allclose(turns, np.round(turns), atol=SQUARE))
-        return cls(nodes, tuple(range(2, 2 * count + 1, 2)), count + 2, mirrored)
+        return cls(nodes, tuple(range(2, 2 * len(faded) + 3, 2)), mirrored, min([1.0, *faded[-1:]]))
 
     @property
     def deposits(self) -> Hashable:
-        return self.nodes.cells, self.orders, self.quarter, self.mirrored
+        return self.nodes.cells, self.orders, self.mirrored
 
     @property
     def waves(self) -> list[tuple[int, bool]]:
@@ -252,7 +257,27 @@ class Even(Basis):
 
     @property
     def azimuths(self) -> Array:  # type: ignore[override]
-        return (np.arange(self.quarter) + 0.5) * np.pi / (2 * self.quarter)
+        return self.rule[0]
+
+    @cached_property
+    def rule(self) -> tuple[Array, Array]:
+        """Azimuths and weights of Gauss' rule for means over a quarter of a turn, of two azimuths more than orders.
+
+        With a share of the last entry of Jacobi's matrix (Golub 1969) it goes over into the rule of one azimuth less,
+        and is as exact as that at least.
+        """
+        beside = np.full(len(self.orders) + 1, 0.5)
+        beside[0] = ROOT / 2
+        beside[-1] *= self.last
+        cosines, vectors = np.linalg.eigh(np.diag(beside, 1) + np.diag(beside, -1))
+        return 0.5 * np.arccos(cosines), vectors[0] ** 2
+
+    @cached_property
+    def _fading(self) -> Array:
+        """Factors of the modes by which light takes to them, and comes from them."""
+        found = np.ones(self.modes)
+        found[[False, *(m == self.orders[-1] for m, _ in self.waves)]] = np.sqrt(self.last)
+        return found
 
     def angular(self, cosine: Value, sine: Value) -> list[Value]:
         turn = cosine * cosine - sine * sine, 2 * cosine * sine
@@ -291,9 +316,9 @@ class Even(Basis):
         return self._sorted(found.reshape(len(found), self.modes, self.nodes.count, -1))
 
     def operators(self, light: Array, rotation: float) -> Array:
-        n, modes, azimuths = self.nodes.count, self.modes, self.azimuths
+        n, modes, (azimuths, weights) = self.nodes.count, self.modes, self.rule
         found = light.reshape(-1, modes, n, len(azimuths), n)
-        matrix = self._basis(azimuths) @ found / len(azimuths)
+        matrix = (weights * self._basis(azimuths)) @ found
         # Cosines and sines do not mix, by the mirror symmetry of the axes
         if not self.mirrored:
             matrix *= (self._sines[:, None] == self._sines)[None, :, None, :, None]
@@ -302,10 +327,11 @@ class Even(Basis):
         return matrix.reshape(-1, 1, self.size, self.size)
 
     def rows(self, values: Array, rotation: float) -> Array:
-        each = values.reshape(len(values), len(self.azimuths), self.nodes.count)
-        basis = self._basis(self.azimuths)
+        azimuths, weights = self.rule
+        each = values.reshape(len(values), len(azimuths), self.nodes.count)
+        basis = weights * self._basis(azimuths)
         basis[self._sines] = 0
-        projected = np.einsum("cqn,bq->cbn", each, basis) / len(self.azimuths)
+        projected = np.einsum("cqn,bq->cbn", each, basis)
         return np.asarray(np.einsum("ax,can->cxn", self._turned(rotation), projected))
 
     def outer(self, emitted: Array, taken: Array) -> Array:
@@ -340,7 +366,7 @@ class Even(Basis):
         return np.stack([np.ones_like(azimuth), *waves])
 
     def _turned(self, rotation: float) -> Array:
-        """Coefficients in a frame that is turned."""
+        """Coefficients in a frame that is turned, faded."""
         found = np.eye(self.modes)
         for i, m in enumerate(self.orders):
             c, s = np.cos(m * rotation), np.sin(m * rotation)
@@ -348,7 +374,7 @@ class Even(Basis):
                 found[i + 1, i + 1] = c
             else:
                 found[2 * i + 1 : 2 * i + 3, 2 * i + 1 : 2 * i + 3] = [[c, s], [-s, c]]
-        return found
+        return self._fading[:, None] * found
 
 
 def _polar(light: Light) -> tuple[Value, Value, Value]:
