@@ -8,6 +8,7 @@ import tmm
 
 import velatura as vt
 from velatura import tables
+from velatura.model.guards import ALPHA_MIN
 from velatura.model.solved.energies.adding import Leaving, indices, layers, parts
 from velatura.model.solved.energies.energies import Energies, energies
 from velatura.model.solved.energies.interfaces import Setting
@@ -89,6 +90,36 @@ def test_smooth_stacks_are_the_incoherent_sum() -> None:
     expected = tmm.inc_tmm("s", layers, [np.inf, thickness, 1e6, np.inf], ["i"] * 4, 0, wavelength)
     assert reflected(found)[0, 0] == pytest.approx(expected["R"], abs=1e-6)
     assert found.passed[0, 0] == pytest.approx(expected["T"], abs=1e-6)
+
+
+NEARLY_SMOOTH: dict[str, Any] = {
+    "metal": lambda alpha: [Interface(eta=1.5), Interface(eta=0.96, k=6.7, alpha=alpha)],
+    "brushed": lambda alpha: [Interface(eta=1.5), Interface(eta=0.96, k=6.7, alpha=[alpha, 0.3 * alpha])],
+    "coat": lambda alpha: [Interface(eta=1.5, alpha=alpha), Interface(eta=0.96, k=6.7)],
+    "middle": lambda alpha: [Interface(eta=1.5), Interface(eta=1.2, alpha=alpha), Interface(eta=1.3, k=2.0)],
+    "pane": lambda alpha: [Interface(eta=1.5, alpha=alpha), Interface(eta=1.0, alpha=0.5 * alpha)],
+}
+
+
+@pytest.mark.parametrize("name", NEARLY_SMOOTH)
+def test_rough_interfaces_tend_to_smooth_ones(name: str) -> None:
+    """Without a jump where a roughness begins, nor where it is resolved."""
+    for alpha in (0.0, ALPHA_MIN * (1 - 1e-9)):
+        here, there = (solved(Stack(NEARLY_SMOOTH[name](each))) for each in (alpha, alpha + 2e-9 * ALPHA_MIN))
+        assert reflected(there) == pytest.approx(reflected(here), abs=1e-6)
+        assert there.passed == pytest.approx(here.passed, abs=1e-6)
+
+
+@pytest.mark.parametrize("alpha", [2e-4, 5e-4])
+@pytest.mark.parametrize("name", ["metal", "coat", "middle"])
+def test_slight_roughness_agrees_with_walks(name: str, alpha: float) -> None:
+    """At a cosine at which light is close to being totally reflected inside."""
+    stack, cosines = Stack(NEARLY_SMOOTH[name](alpha)), np.array([0.5, 0.08])
+    walked = vt.reference.statistics(stack, cosines, paths=100_000, seed=3, microsurface=True)
+    assert walked.standard_error
+    true, error = np.sum(walked.energy, axis=0), np.square(walked.standard_error.energy).sum(axis=0)
+    bound = MODEL_ERROR * true + FALSE_ALARM_SIGMAS * np.sqrt(error)
+    assert (np.abs(reflected(solved(stack, cosines=cosines)) - true) < bound).all()
 
 
 def test_colours_of_a_metal_are_solved_each_like_a_metal_of_its_own() -> None:

@@ -95,7 +95,7 @@ class Facets:
     @property
     def brushed(self) -> float:
         """0 for isotropic facets, towards 1 for those that are long along an axis."""
-        return 1 - min(self.alpha_u, self.alpha_v) / max(self.alpha_u, self.alpha_v, ALPHA_MIN)
+        return 1 - 1 / self.ratio
 
     @property
     def across(self) -> float:
@@ -108,10 +108,11 @@ class Facets:
         return max(self.alpha_u, self.alpha_v, ALPHA_MIN) / max(min(self.alpha_u, self.alpha_v), ALPHA_MIN)
 
     @property
-    def is_smooth(self) -> bool:
-        """Whether it changes no direction."""
+    def smooth(self) -> float:
+        """Share of light whose direction it does not change: all where facets turn none, and the less the rougher
+        they are, up to the least roughness that is resolved."""
         stepless = not self.opaque and bool((self.above == self.below).all())
-        return max(self.alpha_u, self.alpha_v) < ALPHA_MIN or stepless
+        return 1.0 if stepless else max(1 - (max(self.alpha_u, self.alpha_v) / ALPHA_MIN) ** 2, 0.0)
 
     @property
     def step(self) -> float:
@@ -124,8 +125,8 @@ class Facets:
         """Share of refracted light that meets further facets and still passes: a small step hardly turns it."""
         return float(np.exp(-self.step / fitted.STRAIGHT_STEP[often]))
 
-    def smooth(self, p: Array, transmitted: bool) -> Array:
-        """Share (C, ...) of light of momenta p that a smooth interface reflects or transmits."""
+    def share(self, p: Array, transmitted: bool) -> Array:
+        """Share (C, ...) of light of momenta p that it reflects or transmits where it is smooth."""
         n = float(ops.mean(self.above))
         cosine = np.sqrt(np.maximum(1 - (p / n) ** 2, COS_AT_FACETS_MIN**2))
         return self.passing(cosine) if transmitted else self.reflectance(cosine)

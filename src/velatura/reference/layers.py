@@ -25,7 +25,7 @@ from velatura.stack import Address, BaseValues, InterfaceValues, Material, SlabV
 from velatura.stack.chain import chain
 from velatura.stack.values import Pair
 
-ALPHA_MIN = 1e-3  # an interface smoother than this along both axes is perfectly smooth
+ALPHA_MIN = 1e-5  # an interface smoother than this along both axes is perfectly smooth
 _MATCHED = 1e-3  # and so is one between indices this close, which bends no light
 
 

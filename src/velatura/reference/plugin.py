@@ -46,7 +46,7 @@ def make(mi: Any) -> type:
             seed (integer, default 0): of the random numbers; the same seed gives the same picture.
 
         `sample` walks, `eval` is an unbiased estimate, and `pdf` only resembles the density of `sample`: pictures
-        converge to the truth, but the plugin fails a chi-square test. An interface whose roughness is below 0.001 along
+        converge to the truth, but the plugin fails a chi-square test. An interface whose roughness is below 1e-5 along
         both axes is perfectly smooth. Not differentiable.
 
         Components are light that met only smooth interfaces (delta), light that the diffuse base scattered (diffuse),

@@ -123,7 +123,7 @@ def layers(found: Sequence[Part], setting: Setting) -> list[tuple[Layer, Layer]]
 
 def settings(found: Sequence[Part], setting: Setting) -> list[Setting]:
     """That of each layer: beams end at the first rough interface."""
-    ends = [isinstance(part, Lambert) or (isinstance(part, Facets) and not part.is_smooth) for part in found]
+    ends = [isinstance(part, Lambert) or (isinstance(part, Facets) and not part.smooth) for part in found]
     return [setting.dark if any(ends[:i]) else setting for i in range(len(found))]
 
 
@@ -135,7 +135,7 @@ def layer(part: Part, setting: Setting) -> tuple[Layer, Layer]:
 
     def made() -> tuple[Layer, Layer]:
         basis = setting.basis
-        if basis.symmetric is basis or (isinstance(part, Facets) and part.alpha_u != part.alpha_v):
+        if basis.symmetric is basis or (isinstance(part, Facets) and part.ratio != 1):
             return _made(part, setting)
         once, often = layer(part, setting.symmetric)
         spread = once.map(lambda x: basis.of_symmetric(x, setting.phi))

@@ -68,16 +68,29 @@ class Setting:
 def interface(facets: Facets, setting: Setting) -> tuple[Layer, Layer]:
     """An interface as a layer, with facets met once, and as the setting says; what is opaque or final lets nothing
     through, and has no other side."""
-    nothing = Operator.nothing(setting.basis.size, len(setting.p))
-    if facets.is_smooth:
-        r, t = (scaled(partial(facets.smooth, transmitted=side), setting) for side in (False, True))
-        if facets.opaque or facets.final:
-            t = r_below = t_below = nothing
-        else:
-            back = facets.reversed()
-            r_below, t_below = (scaled(partial(back.smooth, transmitted=side), setting) for side in (False, True))
-        smooth = Layer(r, t, r_below, t_below)
+    if not facets.smooth:
+        return _rough(facets, setting)
+    smooth = _smooth(facets, setting)
+    if facets.smooth == 1:
         return smooth, smooth
+    once, often = (each.mixed(smooth, facets.smooth) for each in _rough(facets, setting))
+    return once, often
+
+
+def _smooth(facets: Facets, setting: Setting) -> Layer:
+    r, t = (scaled(partial(facets.share, transmitted=side), setting) for side in (False, True))
+    if facets.opaque or facets.final:
+        nothing = Operator.nothing(setting.basis.size, len(setting.p))
+        return Layer(r, nothing, nothing, nothing)
+    back = facets.reversed()
+    return Layer(r, t, *(scaled(partial(back.share, transmitted=side), setting) for side in (False, True)))
+
+
+def _rough(facets: Facets, setting: Setting) -> tuple[Layer, Layer]:
+    # Light is not in beams any more below what is rough as a whole
+    behind = setting if facets.smooth else setting.dark
+    facets = replace(facets, alpha_u=max(facets.alpha_u, ALPHA_MIN), alpha_v=max(facets.alpha_v, ALPHA_MIN))
+    nothing = Operator.nothing(setting.basis.size, len(setting.p))
     above = _Side.of(facets, setting)
     if facets.opaque or facets.final:
         once, first = (Layer(r, nothing, nothing, nothing) for r in above.r)
@@ -85,7 +98,7 @@ def interface(facets: Facets, setting: Setting) -> tuple[Layer, Layer]:
             return once, once
         to_r = above.blocked[0]
         return once, replace(first, r=first.r + _again(to_r, to_r, above.second[:1], facets, setting))
-    below = _Side.of(facets.reversed(), setting.dark)
+    below = _Side.of(facets.reversed(), behind)
     once, first = (Layer(*each) for each in zip(above.r, above.t, below.r, below.t))
     if not (above.blocked and below.blocked):
         return once, once

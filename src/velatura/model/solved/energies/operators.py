@@ -128,3 +128,8 @@ class Layer:
         r, t = change(self.r), change(self.t)
         alike = self.r_below is self.r and self.t_below is self.t
         return Layer(r, t, r, t) if alike else Layer(r, t, change(self.r_below), change(self.t_below))
+
+    def mixed(self, other: Layer, share: float) -> Layer:
+        """A layer that does what another one does to a share of light."""
+        both = zip(vars(self).values(), vars(other).values())
+        return Layer(*((1 - share) * own + share * there for own, there in both))
