@@ -4,7 +4,8 @@
 
 The tables, with their sources, are tests/shared/radiative_transfer.json: van de Hulst, Giovanelli and DISORT (slabs);
 adding-doubling of slabs with steps of the index and plates of glass (plates) and walks of such; DISORT with 64 streams,
-of one to three media over diffuse bases; and semi-infinite isotropic media by Chandrasekhar's H function, here of
+of one to three media over diffuse bases, and of such of other phase functions (phases, and mie, which needs the extra
+`mie`); Rayleigh's by Sweigart (rayleigh); and semi-infinite isotropic media by Chandrasekhar's H function, here of
 depths 100, 10^4 and 10^6. Printed: the mean error, the largest one, and how many numbers there are.
 """
 
@@ -20,7 +21,7 @@ sys.path.insert(0, str(Path(__file__).parents[1] / "tests" / "shared"))
 import radiative_transfer as known
 from rows import row
 
-TABLES = ("slabs", "plates", "walks", "disort_64", "semi_infinite")
+TABLES = ("slabs", "plates", "walks", "disort_64", "phases", "mie", "rayleigh", "semi_infinite")
 
 
 def main() -> None:

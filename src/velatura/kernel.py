@@ -358,6 +358,7 @@ EXTRAS = {
     "editor": "velatura edit",
     "notebook": "vt.Editor",
     "sweep": "velatura sweep",
+    "mie": "media of spheres",
 }
 
 

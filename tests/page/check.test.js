@@ -16,7 +16,11 @@ const SESSION = {
       films: { kind: 'films', most: 2 },
     },
     film: { eta: index, k: index, thickness_nm: { kind: 'number', low: 0, high: 5000 } },
-    medium: { sigma_a: { kind: 'colour', low: 0, high: null }, g: { kind: 'number', low: -1, high: 1, strict: true } },
+    medium: {
+      sigma_a: { kind: 'colour', low: 0, high: null },
+      g: { kind: 'number', low: -1, high: 1, strict: true },
+      phase: { kind: 'phase' },
+    },
   },
   names: { dielectrics: { bk7: 1.5 }, conductors: { Au: {} } },
 };
@@ -39,6 +43,7 @@ for (const [material, why] of [
   [of({ interface: {}, medium: {} }), /layer 0: must be one of/],
   [of({ interface: { constructor: 1 } }), /layer 0 \(interface\): constructor: is not a key/],
   [of({ interface: { eta: 1.5 } }, { medium: { g: 1 } }), /layer 1 \(medium\): g: must lie in -1 to 1, both excluded/],
+  [of({ medium: { phase: 'rayleigh' } }), /phase: phase functions need Python/],
   [of({ medium: { sigma_a: -1 } }), /sigma_a: must be at least 0/],
   [of({ medium: { sigma_a: [1, 2] } }), /sigma_a: must not be 2 numbers/],
   [of({ medium: { sigma_a: 'red' } }), /sigma_a: must be a number/],

@@ -129,9 +129,19 @@ test('numbers leave the pattern as it is; kinds, axes and textures change it', (
     commands.setValue(state, 1, 'alpha', { texture: 'wood.png' }),
     commands.setThin(state, true),
     commands.enableLayer(state, 2, false),
+    commands.setPhase(state, 2, 'rayleigh'),
+    commands.setPhase(state, 2, { eta: 1.5, size: 1 }),
+    commands.setPhase(state, 2, { eta: 1.5, size: 2 }),
   ];
   const patterns = [state, ...others].map(pattern);
   assert.equal(new Set(patterns).size, patterns.length);
+});
+
+test('a medium has one phase function, by g or by its keys', () => {
+  const forwards = commands.setValue(opened(), 2, 'g', 0.5);
+  const scattered = commands.setPhase(forwards, 2, 'rayleigh');
+  assert.deepEqual(documentOf(scattered).layers[1].medium, { depth: 1, sigma_a: [0.1, 0.5, 2], phase: 'rayleigh' });
+  assert.deepEqual(documentOf(commands.setPhase(scattered, 2)).layers[1].medium, MATERIAL.layers[1].medium);
 });
 
 test('an appearance keeps what is turned off', () => {

@@ -15,6 +15,7 @@ const SESSION = {
       alpha: { kind: 'pair', default: 0 },
       sheen: { kind: 'number', default: 0.5 },
     },
+    medium: { depth: { kind: 'number', default: 1 }, g: { kind: 'number', default: 0 }, phase: { kind: 'phase', default: null } },
     velvet: { fuzz: { kind: 'colour', default: 0 }, weave: { kind: 'choice', default: 'plain' } },
   },
 };
@@ -34,6 +35,11 @@ test('an interface has the indices of its kind, and its roughness along both axe
 test('a parameter, and a kind of layer, is known by being declared', () => {
   assert.equal(valuesOf('interface', { eta: 1.5, sheen: 0.7 }).layer0_sheen, 0.7);
   assert.deepEqual(valuesOf('velvet', { fuzz: [1, 2, 3] }), { exterior: 1, layer0_fuzz: [1, 2, 3] });
+});
+
+test('the asymmetry of a phase function is left to Python', () => {
+  assert.deepEqual(valuesOf('medium', {}), { exterior: 1, layer0_depth: 1, layer0_g: 0 });
+  assert.deepEqual(valuesOf('medium', { phase: 'rayleigh' }), { exterior: 1, layer0_depth: 1 });
 });
 
 test('what varies over the surface is left out', () => {

@@ -57,9 +57,11 @@ def rows(table: str) -> Iterator[Row]:
             stack = _stack([*plate, row["n"]], [_medium(row["b"], row["a"], row["g"])], [*plate, 1.0])
             names = ("UR1", "UT1") if table == "plates" else ("R", "T")
             yield Row(table, name, stack, np.ones(1), *(_array(row[each]) for each in names))
-        elif table == "disort_64":
-            media = [_medium(*each) for each in zip(row["depth"], row["omega"], row["g"])]
-            yield Row(table, name, _stack([], media, row["base_albedo"]), _array(row["mu0"]), _array(row["R"]), None)
+        elif "mu0" in row:
+            media = [_medium(*each) for each in zip(row["depth"], row["omega"], row.get("phase", row.get("g")))]
+            below = [1.0] if row["base_albedo"] is None else row["base_albedo"]
+            stack, reflected, passed = _stack([], media, below), _array(row["R"]), _array(row.get("T"))
+            yield Row(table, name, stack, _array(row["mu0"]), reflected, passed)
         else:
             for depth in DEPTHS:
                 stack = _stack([], [_medium(depth, row["omega"], 0.0)], 0.0)
@@ -71,16 +73,14 @@ def _array(value: float | None) -> Array | None:
     return None if value is None else np.array([value])
 
 
-def _medium(depth: float, albedo: float, g: float) -> vt.Medium:
-    return vt.Medium(depth=depth, sigma_s=albedo, sigma_a=1 - albedo, g=g)
+def _medium(depth: float, albedo: float, phase: Any) -> vt.Medium:
+    """A medium by its asymmetry, or by another phase function."""
+    key = "g" if isinstance(phase, int | float) else "phase"
+    return vt.Medium(depth=depth, sigma_s=albedo, sigma_a=1 - albedo, **{key: phase})
 
 
 def _stack(above: list[float], media: list[vt.Medium], below: list[float] | float) -> vt.Stack:
-    """Smooth interfaces to indices `above`, media with interfaces of no step between, and interfaces to indices
-    `below`, or a base of an albedo."""
-    n = above[-1] if above else 1.0
-    layers: list[Any] = [vt.Interface(eta=each, alpha=0) for each in above]
-    for k, medium in enumerate(media):
-        layers += [*([vt.Interface(eta=n, alpha=0)] if k else []), medium]
+    """Smooth interfaces to indices `above`, media, and interfaces to indices `below`, or a base of an albedo."""
+    layers: list[Any] = [*(vt.Interface(eta=each, alpha=0) for each in above), *media]
     last = [vt.Diffuse(albedo=below)] if isinstance(below, float) else [vt.Interface(eta=x, alpha=0) for x in below]
     return vt.Stack([*layers, *last])

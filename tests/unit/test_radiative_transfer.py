@@ -1,4 +1,4 @@
-"""Energies of media against van de Hulst, Chandrasekhar, DISORT, adding-doubling of others, and walks."""
+"""Energies of media against van de Hulst, Chandrasekhar, Sweigart, DISORT, adding-doubling of others, and walks."""
 
 from __future__ import annotations
 
@@ -15,8 +15,12 @@ from velatura.stack import Interface, Material, Medium, Stack
 MOST, MEAN = 2e-3, 5e-4  # of the incident light
 
 
-@pytest.mark.parametrize("table", ["slabs", "plates", "disort_64", "walks", "semi_infinite"])
+@pytest.mark.parametrize(
+    "table", ["slabs", "plates", "disort_64", "walks", "semi_infinite", "rayleigh", "phases", "mie"]
+)
 def test_energies_are_those_of_outside_solvers(table: str) -> None:
+    if table == "mie":
+        pytest.importorskip("miepython")
     errors = {row.name: np.abs(row.errors()) for row in rows(table)}
     assert {name: error for name, error in errors.items() if error.max() > MOST} == {}
     assert np.concatenate([*errors.values()]).mean() < MEAN

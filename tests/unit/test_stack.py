@@ -388,7 +388,7 @@ def test_the_schema_knows_every_key_and_range() -> None:
     }
     assert {entry: set(keys) for entry, keys in layers.items()} == {
         "interface": {"eta", "k", "conductor", "alpha", "rotation", "films"},
-        "medium": {"depth", "sigma_a", "sigma_s", "g"},
+        "medium": {"depth", "sigma_a", "sigma_s", "g", "phase"},
         "diffuse": {"albedo"},
     }
     assert set(schema["properties"]) == {"name", "source", "exterior", "thin", "layers"}

@@ -133,9 +133,6 @@ VALUES = {
         "layer 0: must hold one of interface, medium, diffuse alone, got interface, eta; check the indent"
     ),
     COAT + "  - medium: {}": "layer 1 (medium): an interface or a diffuse base must lie below a medium",
-    COAT + "  - medium: {}\n  - medium: {}\n  - diffuse: {}": (
-        "layer 2 (medium): two media in a row; put an interface between them"
-    ),
     "layers: [{interface: {conductor: Au}}, {medium: {}}]": (
         "layer 1 (medium): nothing may lie below layer 0 (conductor), which is opaque"
     ),
@@ -300,7 +297,7 @@ def test_a_path_that_cannot_be_written_gets_one_line(
             {"layer0_k": 1},
             "layer0_k: layer 0 (dielectric) has no k, only eta, alpha, alpha_u, alpha_v, rotation, films",
         ),
-        ({"layer1_eta": 1}, "layer1_eta: layer 1 (medium) has no eta, only depth, sigma_a, sigma_s, g"),
+        ({"layer1_eta": 1}, "layer1_eta: layer 1 (medium) has no eta, only depth, sigma_a, sigma_s, g, phase"),
         ({"layer3_eta": 1}, "layer3_eta: the last layer is layer 2"),
         ({"layer_0_eta": 1}, "unknown parameter 'layer_0_eta' (did you mean layer0_eta?)"),
         ({"exteror": 1}, "unknown parameter 'exteror' (did you mean exterior?)"),

@@ -15,6 +15,7 @@ from velatura.model.solved.lobes import refracted_lobe, widths
 from velatura.model.solved.lobes.refracted_lobe import RefractedLobe
 from velatura.model.variance import Roughness
 from velatura.optics import fresnel
+from velatura.optics.phase import HenyeyGreenstein
 from velatura.stack import Material
 
 Array = NDArray[np.floating]
@@ -103,14 +104,16 @@ def test_events_of_a_veil_are_those_that_turn_light_by_little() -> None:
     for g in (0.5, 0.9, 0.98):
         s = (1 - g * g) / (1 - g + 2 * g * u)
         angle = np.arccos((1 + g * g - s * s) / (2 * g))
-        assert widths.nearly_straight(g) == pytest.approx(np.mean(angle < widths.NEARLY_STRAIGHT), abs=2e-4)
+        assert widths.nearly_straight(HenyeyGreenstein(g)) == pytest.approx(
+            np.mean(angle < widths.NEARLY_STRAIGHT), abs=2e-4
+        )
         layers = found(Interface(eta=1.5), Medium(sigma_s=0.1, g=g), Interface(conductor="mirror"))
         narrow = widths.Tensor(*(np.full(3, x) for x in (1e-8, 0.0, 1e-8)))
         veil = widths.veil(layers, 1, COSINES, narrow)
-        events = 2 * widths.nearly_straight(g) * 0.1 / np.sqrt(1 - (1 - COSINES**2) / 1.5**2)
+        events = 2 * widths.nearly_straight(HenyeyGreenstein(g)) * 0.1 / np.sqrt(1 - (1 - COSINES**2) / 1.5**2)
         median = np.median(angle[angle < widths.NEARLY_STRAIGHT])
         np.testing.assert_allclose(veil.size, 0.5 * median * events / (1 - np.exp(-events)), rtol=5e-3)
-    assert widths.nearly_straight(0.0) == widths.nearly_straight(-0.5) == 0
+    assert widths.nearly_straight(HenyeyGreenstein(0.0)) == widths.nearly_straight(HenyeyGreenstein(-0.5)) == 0
 
 
 WALKED = {

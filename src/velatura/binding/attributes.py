@@ -39,6 +39,8 @@ def plugin_class(mi: Any) -> type:
         def traverse(self, callback: Any) -> None:
             textures = {name: x.texture for name, x in self.binding.images.items() if isinstance(x, Image)}
             for name, value in {**self.binding.parameters, **textures}.items():
+                if name in self.binding.derived:
+                    continue
                 smooth = self.binding.addresses[name].declared.differentiable
                 flags = mi.ParamFlags.Differentiable if smooth else mi.ParamFlags.NonDifferentiable
                 callback.put(name, value, flags)

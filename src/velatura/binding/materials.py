@@ -30,6 +30,7 @@ class Binding:
     Attributes:
         stack: the material as described; textures given as objects have a number standing in.
         addresses: of all values by flat name.
+        derived: names of values that follow from others: the asymmetry of a phase function that is written.
         parameters: Dr.Jit values by flat name, as they were given or last changed.
         constants: the same, within the ranges of their parameters.
         images: textures, spectra and fields by flat name.
@@ -44,6 +45,8 @@ class Binding:
         self.mi = mi
         self.stack, values = properties_of.described(mi, properties, options)
         self.addresses = {address.name: address for address in values}
+        phases = self.stack.phases
+        self.derived = {at.name for at in values if at.key == "g" and at.layer is not None and phases[at.layer]}
         self.parameters, self.images = properties_of.bound(mi, values)
         self.constants: dict[str, Any] = {}
         self.ranges: dict[str, Range | None] = {}

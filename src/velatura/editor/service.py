@@ -36,8 +36,9 @@ from velatura.model import DEFAULT, MODELS, SWITCHES, Model
 from velatura.scenes.environments import PHOTOGRAPHS, sky, studio
 from velatura.scenes.objects import OBJECTS, ground, plinth
 from velatura.scenes.surfaces import Mesh
-from velatura.stack import Named, Stack, Texture, dumps, loads, names, preset, presets, rgb
+from velatura.stack import Named, Stack, Texture, dumps, loads, names, phases, preset, presets, rgb
 from velatura.stack.layers import LAYERS, LayerRecord, has
+from velatura.stack.phases import Phase
 from velatura.stack.schema import Parameter, Record, parameters, unknown
 from velatura.stack.spectra import MIRROR
 from velatura.stack.values import (
@@ -67,6 +68,7 @@ KINDS: dict[type[Parameter], str] = {
     Choice: "choice",
     Films: "films",
     Conductor: "choice",
+    Phase: "phase",
     Flag: "flag",
     Text: "text",
 }
@@ -113,6 +115,7 @@ _RECORDS: dict[str, type[Record]] = {
     "film": Film,
     "texture": Texture,
     "brushing": Brushing,
+    **phases.RECORDS,
 }
 
 

@@ -1,17 +1,164 @@
-"""The Henyey-Greenstein phase function.
+"""Phase functions of media.
 
 `cos_theta` is the cosine between the directions of travel before and after scattering: 1 goes straight on.
 """
 
 from __future__ import annotations
 
-from math import pi
+from abc import ABC, abstractmethod
+from collections.abc import Hashable
+from dataclasses import dataclass
+from math import cos, pi, sqrt
+from typing import Any
 
 from velatura import ops
 from velatura.ops import Value
 from velatura.optics.ggx import Direction
 
 G_MIN = 1e-3  # where it scatters evenly, and a division by g would be one by 0
+
+
+class PhaseFunction(ABC):
+    """A distribution over the sphere of the directions that light is scattered into, by their angle to its own."""
+
+    @abstractmethod
+    def density(self, cos_theta: Value) -> Value:
+        """Density per solid angle, in 1/sr."""
+
+    @abstractmethod
+    def sample(self, u: Value) -> Value:
+        """Cosine drawn by a uniform u in [0, 1)."""
+
+    @abstractmethod
+    def within(self, angle: float) -> float:
+        """Share of scattered light that is deflected by less than an angle (radians)."""
+
+    @property
+    @abstractmethod
+    def key(self) -> Hashable:
+        """Equal for phase functions of numbers that are the same."""
+
+    def widened(self, g: float) -> tuple[PhaseFunction, float]:
+        """The phase function with no lobe narrower than of asymmetry g; and the share of scattered light that it is
+        for, all other light going straight on (van de Hulst's similarity relation)."""
+        return self, 1.0
+
+    @staticmethod
+    def selected(where: Value, yes: PhaseFunction | None, no: PhaseFunction | None) -> PhaseFunction | None:
+        """`yes` where a condition holds, else `no`; the other one of None, which is that of a medium that scatters
+        nothing. It is what `ops.select_record` calls."""
+        if yes is None or no is None:
+            return yes or no
+        if isinstance(yes, HenyeyGreenstein) and isinstance(no, HenyeyGreenstein):
+            return HenyeyGreenstein(ops.select_record(where, yes.g, no.g))
+        return _Either(where, yes, no)
+
+
+@dataclass(frozen=True)
+class HenyeyGreenstein(PhaseFunction):
+    """That of Henyey and Greenstein, by its asymmetry g in (-1, 1)."""
+
+    g: Value
+
+    def density(self, cos_theta: Value) -> Value:
+        return henyey_greenstein(cos_theta, self.g)
+
+    def sample(self, u: Value) -> Value:
+        return sample_henyey_greenstein(self.g, u)
+
+    def within(self, angle: float) -> float:
+        g = float(self.g)
+        if abs(g) < G_MIN:
+            return (1 - cos(angle)) / 2
+        chord = sqrt(1 + g * g - 2 * g * cos(angle))
+        return (1 - g * g) / (2 * g) * (1 / (1 - g) - 1 / chord)
+
+    @property
+    def key(self) -> Hashable:
+        return type(self), float(self.g)
+
+    def widened(self, g: float) -> tuple[PhaseFunction, float]:
+        bounded = min(max(self.g, -g), g)
+        return HenyeyGreenstein(bounded), min((1 - self.g) / (1 - bounded), 1.0)
+
+
+@dataclass(frozen=True)
+class TwoLobes(PhaseFunction):
+    """A share of one phase function of Henyey and Greenstein's, and the rest of another."""
+
+    first: HenyeyGreenstein
+    second: HenyeyGreenstein
+    share: float
+
+    def density(self, cos_theta: Value) -> Value:
+        return self.share * self.first.density(cos_theta) + (1 - self.share) * self.second.density(cos_theta)
+
+    def sample(self, u: Value) -> Value:
+        of_first = u < self.share
+        rest = ops.divide(ops.select(of_first, u, u - self.share), ops.select(of_first, self.share, 1 - self.share))
+        return sample_henyey_greenstein(ops.select(of_first, self.first.g, self.second.g), rest)
+
+    def within(self, angle: float) -> float:
+        return self.share * self.first.within(angle) + (1 - self.share) * self.second.within(angle)
+
+    @property
+    def key(self) -> Hashable:
+        return type(self), self.first.key, self.second.key, self.share
+
+    def widened(self, g: float) -> tuple[PhaseFunction, float]:
+        (first, of_first), (second, of_second) = self.first.widened(g), self.second.widened(g)
+        assert isinstance(first, HenyeyGreenstein) and isinstance(second, HenyeyGreenstein)
+        left = self.share * of_first + (1 - self.share) * of_second
+        return TwoLobes(first, second, self.share * of_first / left), left
+
+
+@dataclass(frozen=True)
+class Rayleigh(PhaseFunction):
+    """That of particles far smaller than the wavelength, for unpolarised light: 3 / (16 pi) (1 + cos^2)."""
+
+    def density(self, cos_theta: Value) -> Value:
+        return 3 / (16 * pi) * (1 + cos_theta * cos_theta)
+
+    def sample(self, u: Value) -> Value:
+        # The root of c^3 + 3 c = 2 q, by Cardano, for q on the positive side, since for -q it is -c
+        q = 4 * u - 2
+        size = ops.absolute(q)
+        root = ops.power(size + ops.sqrt(size * size + 1), 1 / 3)
+        cosine = root - 1 / root
+        return ops.clip(ops.select(q < 0, -1 * cosine, cosine), -1.0, 1.0)
+
+    def within(self, angle: float) -> float:
+        c = cos(angle)
+        return (4 - 3 * c - c * c * c) / 8
+
+    @property
+    def key(self) -> Hashable:
+        return type(self)
+
+
+@dataclass(frozen=True)
+class _Either(PhaseFunction):
+    """One phase function where a condition holds, and elsewhere another."""
+
+    where: Value
+    yes: PhaseFunction
+    no: PhaseFunction
+
+    def density(self, cos_theta: Value) -> Value:
+        return self._chosen(self.yes.density(cos_theta), self.no.density(cos_theta))
+
+    def sample(self, u: Value) -> Value:
+        return self._chosen(self.yes.sample(u), self.no.sample(u))
+
+    def within(self, angle: float) -> float:
+        return float(self._chosen(self.yes.within(angle), self.no.within(angle)))
+
+    @property
+    def key(self) -> Hashable:
+        return type(self), bool(self.where), self.yes.key, self.no.key
+
+    def _chosen(self, yes: Value, no: Value) -> Any:
+        return ops.select(self.where, yes, no)
 
 
 def henyey_greenstein(cos_theta: Value, g: Value) -> Value:

@@ -27,7 +27,7 @@ class Ends:
     """How n paths ended.
 
     w (3, n): the direction in which they left, below the surface where light was transmitted; weight (3, n) by colour,
-    0 where they died; deepest (n,): the deepest slab that they were in, counted from 0 above the first surface;
+    0 where they died; deepest (n,): the number of surfaces above the deepest slab that they were in;
     truncated: the mean weight of those that were cut off; stokes (3, 3, n): Q, U and V by colour, as the weight is the
     intensity, in the frame of `velatura.reference.stokes`, or None where polarisation was left out.
     """
@@ -85,7 +85,8 @@ def _part(layers: WalkedLayers, wi: Array, count: int, seed: int, start: int, po
     dr.eval(path.w, weight, path.deepest, cut_off, parts)
     w = np.stack([component.numpy() for component in path.w])
     stokes = np.stack([part.numpy() for part in parts]) if parts else None
-    return Ends(w, weight.numpy(), path.deepest.numpy(), float(cut_off.numpy().mean()), stokes)
+    deepest = np.array(layers.above, np.uint32)[path.deepest.numpy()]
+    return Ends(w, weight.numpy(), deepest, float(cut_off.numpy().mean()), stokes)
 
 
 @kernel.exclusive

@@ -17,9 +17,11 @@ from velatura.films.of_material import films_of
 from velatura.films.polarised import PolarisedFilms, polarised_films
 from velatura.films.reflectance import InterfaceFilms
 from velatura.films.tables import Coated
+from velatura.media.of_material import phase_of
 from velatura.ops import Value
 from velatura.optics import fresnel, ggx
 from velatura.optics.ggx import Direction
+from velatura.optics.phase import PhaseFunction
 from velatura.optics.polarisation import Mueller, Polarisation, complement, mueller
 from velatura.stack import Address, BaseValues, InterfaceValues, Material, SlabValues, srgb_sensitivity
 from velatura.stack.chain import chain
@@ -65,15 +67,16 @@ class WalkedSurface:
 
 @dataclass(frozen=True)
 class WalkedSlab:
-    """A medium by its optical depths along the normal, and its asymmetry; `scatters` decides which code is compiled."""
+    """A medium by its optical depths along the normal, and its phase function, None where it scatters nothing, which
+    decides which code is compiled."""
 
     absorption: Value = 0.0
     scattering: Value = 0.0
-    g: Value = 0.0
+    phase: PhaseFunction | None = None
 
-    @property
-    def scatters(self) -> bool:
-        return not _is_zero(self.scattering)
+    @classmethod
+    def of(cls, layer: SlabValues) -> WalkedSlab:
+        return cls(layer.tau_a, layer.tau_s, None if _is_zero(layer.tau_s) else phase_of(layer))
 
     def absorbed(self, length: Value) -> Value:
         """Share that absorption leaves along a way of that length."""
@@ -89,7 +92,8 @@ class WalkedLayers:
     """Surfaces and slabs from the top, slab n included; `base` is the kind of the last surface.
 
     With `microsurface`, light scatters many times between the facets of a surface. `films` are those on each surface,
-    counted from below where the stack is `flipped`.
+    counted from below where the stack is `flipped`. Between media without an interface there is a smooth surface that
+    bends no light: `above` are the numbers of other surfaces above each slab.
     """
 
     base: str
@@ -101,6 +105,7 @@ class WalkedLayers:
     microsurface: bool = False
     films: tuple[InterfaceFilms | None, ...] = ()
     flipped: Value = False
+    above: tuple[int, ...] = ()
 
     @property
     def count(self) -> int:
@@ -113,7 +118,7 @@ class WalkedLayers:
     @property
     def scatters(self) -> bool:
         """Whether any medium scatters."""
-        return any(slab.scatters for slab in self.slabs)
+        return any(slab.phase for slab in self.slabs)
 
     def reversed(self, where: Value) -> WalkedLayers:
         """The stack seen from below where the condition holds; only for one that transmits."""
@@ -232,17 +237,23 @@ def from_material(material: Material, microsurface: bool) -> WalkedLayers:
     slabs: list[WalkedSlab] = []
     index: list[Value] = [material.exterior]
     films: list[InterfaceFilms | None] = []
-    medium, last = WalkedSlab(), material.layers[-1]
+    above = [0]
+    medium, last = None, material.layers[-1]
     for meeting in chain(material, films_of(material)):
         layer = meeting.layer
-        if isinstance(layer, SlabValues):
-            medium = WalkedSlab(layer.tau_a, layer.tau_s, layer.g)
+        if isinstance(layer, SlabValues) and medium is None:
+            medium = WalkedSlab.of(layer)
             continue
-        slabs.append(medium)
+        slabs.append(medium or WalkedSlab())
         films.append(meeting.films)
         index.append(1.0 if meeting.below is None else meeting.below)
-        medium = WalkedSlab()
-        surfaces.append(_surface(layer, *index[-2:]))
+        if isinstance(layer, SlabValues):
+            surfaces.append(WalkedSurface(ALPHA_MIN, ALPHA_MIN, 0.0, True))
+            medium = WalkedSlab.of(layer)
+        else:
+            surfaces.append(_surface(layer, *index[-2:]))
+            medium = None
+        above.append(above[-1] + (medium is None))
     extinction = last.k if isinstance(last, InterfaceValues) and last.k is not None else 0.0
     return WalkedLayers(
         "diffuse" if isinstance(last, BaseValues) else last.kind,
@@ -253,6 +264,7 @@ def from_material(material: Material, microsurface: bool) -> WalkedLayers:
         last.albedo if isinstance(last, BaseValues) else 0.0,
         microsurface,
         tuple(films),
+        above=tuple(above),
     )
 
 

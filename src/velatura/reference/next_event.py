@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING, Any
 
 from velatura import ops
 from velatura.ops import Value
-from velatura.optics import ggx, phase
+from velatura.optics import ggx
 from velatura.optics.ggx import Direction
 from velatura.reference import events, facets
 from velatura.reference.events import ScatteringEvent, SurfaceMeeting
@@ -137,11 +137,12 @@ def connect_surface(meeting: SurfaceMeeting, event: ScatteringEvent, out: WayOut
 def connect_medium(layers: WalkedLayers, out: WayOut, path: Path) -> Value:
     """Contribution of a path that scatters in a medium along the way, per unit of its weight."""
     k, slab = path.slab, layers.slab(path.slab)
+    assert slab.phase
     w = _direction(out, k)
-    density = phase.henyey_greenstein(ggx.dot(path.w, w), slab.g)
+    density = slab.phase.density(ggx.dot(path.w, w))
     more = ops.divide(density, pick(out.density, k)) * pick(out.others, k)
     upwards = density / (1 + more) * pick(out.up, k) * transmittance(slab, w[2], path.height)
-    density = phase.henyey_greenstein(ggx.dot(path.w, (w[0], w[1], -w[2])), slab.g)
+    density = slab.phase.density(ggx.dot(path.w, (w[0], w[1], -w[2])))
     return upwards + density * pick(out.down, k) * transmittance(slab, w[2], 1 - path.height)
 
 

@@ -12,8 +12,9 @@ from typing import Any
 
 from velatura import ops
 from velatura.ops import Value
-from velatura.optics import ggx, phase
+from velatura.optics import ggx
 from velatura.optics.ggx import Direction
+from velatura.optics.phase import deflect
 from velatura.optics.polarisation import Polarisation, unpolarised
 from velatura.reference import events, facets
 from velatura.reference.events import SurfaceMeeting
@@ -152,16 +153,17 @@ def _scatter(types: Any, layers: WalkedLayers, path: Path, out: WayOut | None, p
     weight, density = onward.weight, onward.density
     slab = ops.select(onward.reflected, path.slab, beyond)
     if layers.scatters:
-        g = layers.slab(path.slab).g
-        cosine = phase.sample_henyey_greenstein(g, u1)
-        scattered = phase.deflect(path.w, cosine, 2 * pi * u2)
+        phase = layers.slab(path.slab).phase
+        assert phase
+        cosine = phase.sample(u1)
+        scattered = deflect(path.w, cosine, 2 * pi * u2)
         turned = (
             ops.select(path.inside, scattered[0], turned[0]),
             ops.select(path.inside, scattered[1], turned[1]),
             ops.select(path.inside, scattered[2], turned[2]),
         )
         weight = ops.select(path.inside, 1.0, weight)
-        density = ops.select(path.inside, phase.henyey_greenstein(cosine, g), density)
+        density = ops.select(path.inside, phase.density(cosine), density)
         chain = ops.select(path.inside, 1.0, chain)
         slab = ops.select(path.inside, path.slab, slab)
         light = light and ops.select_record(path.inside, unpolarised(turned, path.weight), light)

@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 from velatura.stack.layers import LAYERS
+from velatura.stack.phases import RECORDS
 from velatura.stack.schema import Parameter, Record, parameters
 from velatura.stack.stack import Stack
 from velatura.stack.values import Brushing, Film, Spectrum, Texture
@@ -25,6 +26,7 @@ def json_schema() -> dict[str, Any]:
             "texture": {**_keys(Texture), "required": ["texture"]},
             "brushing": {**_keys(Brushing), "required": ["brushing"]},
             "film": {**_keys(Film), "required": ["eta", "thickness_nm"]},
+            **{name: {**_keys(record), "required": _required(record)} for name, record in RECORDS.items()},
         },
     }
 
@@ -42,6 +44,7 @@ def parameter_table() -> str:
         "texture": Texture,
         "brushing": Brushing,
         "film": Film,
+        **RECORDS,
     }
     for where, model in models.items():
         for key, parameter in parameters(model).items():
@@ -53,6 +56,10 @@ def _keys(model: type[Record]) -> dict[str, Any]:
     return _object(
         {key: {**parameter.json_schema(), "description": parameter.doc} for key, parameter in parameters(model).items()}
     )
+
+
+def _required(model: type[Record]) -> list[str]:
+    return [key for key, field in model.model_fields.items() if field.is_required()]
 
 
 def _object(properties: dict[str, Any]) -> dict[str, Any]:

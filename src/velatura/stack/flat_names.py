@@ -199,6 +199,11 @@ def _merged(old: Mapping[str, Any], new: Mapping[str, Any]) -> dict[str, Any]:
     if metal and metal == _name(fields.get("k"), "k"):
         fields = {"conductor": metal, **{key: value for key, value in fields.items() if key not in ("eta", "k")}}
 
+    # Let a phase function replace the asymmetry of another, and the other way round
+    for one, other in (("phase", "g"), ("g", "phase")):
+        if one in new and other not in new:
+            fields.pop(other, None)
+
     # Let an axis replace its part of alpha
     if "alpha_u" in new or "alpha_v" in new:
         alpha = fields.get("alpha", 0.0)

@@ -13,6 +13,7 @@ from typing import Annotated, Any, ClassVar, Literal, TypeAlias
 
 from pydantic import model_validator
 
+from velatura.stack.phases import Phase, PhaseRecord, WrittenPhase, asymmetry
 from velatura.stack.schema import Parameter, Record, parameters
 from velatura.stack.spectra import MIRROR, Named, names
 from velatura.stack.values import (
@@ -71,11 +72,13 @@ class InterfaceValues:
 
 class SlabValues(ABC):
     """What lies between two surfaces, as models read it: its optical depths along the normal (colours), and its
-    asymmetry `g`, the mean cosine of the scattering angle.
+    asymmetry `g`, the mean cosine of the scattering angle. Its phase function is Henyey and Greenstein's of that, or
+    else `phase` as written (`velatura.media`).
     """
 
     kind: ClassVar[Kind]
     g: Any
+    phase: WrittenPhase | None = None
 
     @property
     @abstractmethod
@@ -95,13 +98,14 @@ class SlabValues(ABC):
 
 @dataclass(frozen=True)
 class MediumValues(SlabValues):
-    """A homogeneous medium: thickness, coefficients per unit of length, and asymmetry."""
+    """A homogeneous medium: thickness, coefficients per unit of length, asymmetry, and maybe a phase function."""
 
     kind: ClassVar[Kind] = "medium"
     depth: Any
     sigma_a: Any
     sigma_s: Any
     g: Any
+    phase: WrittenPhase | None = None
 
     @property
     def tau_a(self) -> Any:
@@ -287,7 +291,7 @@ class Interface(LayerRecord):
 
 
 class Medium(LayerRecord):
-    """A homogeneous medium between two interfaces, or above the first."""
+    """A homogeneous medium, above an interface, a diffuse base or another medium."""
 
     record = MediumValues
     lacks: ClassVar[Mapping[Kind, tuple[str, ...]]] = {"medium": ()}
@@ -302,11 +306,22 @@ class Medium(LayerRecord):
         float | Texture,
         Scalar("mean cosine of the scattering angle (Henyey-Greenstein)", low=-1, high=1, strict=True),
     ] = 0.0
+    phase: Annotated[str | PhaseRecord | None, Phase("phase function, in place of g")] = None
+
+    @model_validator(mode="after")
+    def _one_phase_function(self) -> Medium:
+        if self.phase is not None and self.g != 0:
+            raise ValueError("g: not together with phase, which has an asymmetry of its own")
+        return self
 
     @property
     def lossless(self) -> bool:
         """Whether it absorbs no light."""
         return self.sigma_a in (0.0, (0.0, 0.0, 0.0))
+
+    def written(self, key: str) -> Any:
+        """The value of a parameter as written; `g` is the asymmetry of any phase function."""
+        return asymmetry(self.phase) if key == "g" and self.phase is not None else getattr(self, key)
 
 
 class Diffuse(LayerRecord):

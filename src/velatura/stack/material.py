@@ -11,7 +11,8 @@ from itertools import islice
 from typing import Any, TypeAlias
 
 from velatura.stack.flat_names import Address, addresses
-from velatura.stack.layers import KINDS, FilmValues, InterfaceValues, Kind, LayerValues, transmits
+from velatura.stack.layers import KINDS, FilmValues, InterfaceValues, Kind, LayerValues, SlabValues, transmits
+from velatura.stack.phases import WrittenPhase
 from velatura.stack.stack import Stack
 
 Value: TypeAlias = Any
@@ -57,8 +58,10 @@ class Material:
         """Values by flat name, as `Stack.flat` has them, of layers of the same kinds as others."""
         exterior, *others = (values[address.name] for address in addresses(like.kinds, like.films))
         each, layers = iter(others), []
-        for kind, films in zip(like.kinds, like.films):
+        for kind, films, phase in zip(like.kinds, like.films, like.phases):
             own: dict[str, Any] = {address.key: next(each) for address in addresses((kind,))[1:]}
+            if phase is not None:
+                own["phase"] = phase
             several: dict[str, Any] = {"kind": kind} if len(KINDS[kind].lacks) > 1 else {}
             if films:
                 own["films"] = tuple(FilmValues(*islice(each, len(fields(FilmValues)))) for _ in range(films))
@@ -96,6 +99,11 @@ class Material:
     def films(self) -> tuple[int, ...]:
         """The number of films on each layer."""
         return tuple(len(layer.films) if isinstance(layer, InterfaceValues) else 0 for layer in self.layers)
+
+    @property
+    def phases(self) -> tuple[WrittenPhase | None, ...]:
+        """The phase function of each layer, where it is not Henyey and Greenstein's."""
+        return tuple(layer.phase if isinstance(layer, SlabValues) else None for layer in self.layers)
 
     def flat(self) -> dict[str, Value]:
         """All values by flat name."""

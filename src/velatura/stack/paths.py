@@ -16,7 +16,7 @@ from velatura.errors import InvalidInput
 from velatura.files import content, whole
 from velatura.stack.stack import Stack
 
-KEYS = ("texture", "spectrum")  # of paths
+KEYS = ("texture", "spectrum", "table")  # of paths
 
 
 def rewritten(node: Any, rewrite: Callable[[str], str]) -> Any:

@@ -7,22 +7,19 @@ Mitsuba itself is not imported, and NumPy only where a spectrum is read.
 from __future__ import annotations
 
 import functools
-import math
-from collections.abc import Sequence
 from dataclasses import dataclass
 from importlib import resources
 from importlib.machinery import PathFinder
 from pathlib import Path
-from typing import TYPE_CHECKING, Literal, TypeAlias
+from typing import TYPE_CHECKING, Literal
 
 from velatura.errors import InvalidInput, MissingTool
-from velatura.files import number, text_of
+from velatura.stack import tables
+from velatura.stack.tables import Table
 
 if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
-
-Table: TypeAlias = tuple[Sequence[float], Sequence[float]]
 
 MIRROR = "mirror"  # the conductor that reflects all light; it has no spectrum
 
@@ -32,7 +29,6 @@ _CRYSTALS = ("CsI", "MgO", "SiC", "ThF4", "TiO2", "TiO2-e", "d-C")
 # Files of the wheel with holes: eta is 0 below 440 nm (AlAs), nothing above 590 nm (AlSb), k is 0 throughout (SnTe).
 _BROKEN = ("AlAs", "AlSb", "SnTe")
 
-_LARGEST = 2**20  # bytes of a table
 VISIBLE_NM = (360.0, 830.0)  # that Mitsuba renders
 LUMINANCE = (0.212671, 0.715160, 0.072169)  # of linear sRGB (ITU-R BT.709), as in Mitsuba
 
@@ -184,20 +180,7 @@ def read(path: Path) -> Table:
     Raises:
         ValueError: it is none; one line that names the file, without its content.
     """
-    rows: list[tuple[float, float]] = []
-    for at, line in enumerate(text_of(path, _LARGEST).splitlines(), start=1):
-        cells = line.partition("#")[0].replace(",", " ").split()
-        if not cells:
-            continue
-        try:
-            wavelength_nm, value = map(number, cells)
-        except ValueError:
-            raise ValueError(f"{path}: line {at}: must be a wavelength in nanometres and a value") from None
-        if not (math.isfinite(wavelength_nm) and math.isfinite(value)):
-            raise ValueError(f"{path}: line {at}: must be finite")
-        if rows and wavelength_nm <= rows[-1][0]:
-            raise ValueError(f"{path}: line {at}: wavelengths must ascend")
-        rows.append((wavelength_nm, value))
+    rows = tables.read(path, "a wavelength in nanometres", "wavelengths")
     if len(rows) < 2 or rows[-1][0] < VISIBLE_NM[0] or rows[0][0] > VISIBLE_NM[1]:
         raise ValueError(f"{path}: must hold values at two wavelengths or more, in nanometres, of visible light")
     wavelengths_nm, values = zip(*rows)

@@ -10,7 +10,19 @@ from pydantic import model_validator
 from velatura.errors import InvalidInput, within
 from velatura.stack import coatings, flat_names
 from velatura.stack.flat_names import Address
-from velatura.stack.layers import EXTERIOR, LAYERS, Diffuse, Interface, Kind, Layer, Value, entry_name, transmits
+from velatura.stack.layers import (
+    EXTERIOR,
+    LAYERS,
+    Diffuse,
+    Interface,
+    Kind,
+    Layer,
+    Medium,
+    Value,
+    entry_name,
+    transmits,
+)
+from velatura.stack.phases import WrittenPhase
 from velatura.stack.schema import Record, show, unknown
 from velatura.stack.values import Flag, Text
 
@@ -45,8 +57,6 @@ class Stack(Record):
             where = f"layer {index} ({entry_name(below)})"
             if above.opaque:
                 raise ValueError(f"{where}: nothing may lie below layer {index - 1} ({above.kind}), which is opaque")
-            if not above.surface and not below.surface:
-                raise ValueError(f"{where}: two media in a row; put an interface between them")
         if not self.layers[-1].surface:
             last = f"layer {len(self.layers) - 1} ({self.kinds[-1]})"
             raise ValueError(f"{last}: an interface or a diffuse base must lie below a {self.kinds[-1]}")
@@ -66,6 +76,11 @@ class Stack(Record):
     def films(self) -> tuple[int, ...]:
         """The number of thin films on every layer."""
         return tuple(len(layer.films) if isinstance(layer, Interface) else 0 for layer in self.layers)
+
+    @property
+    def phases(self) -> tuple[WrittenPhase | None, ...]:
+        """The phase function of every layer, where it is not written by its asymmetry."""
+        return tuple(layer.phase if isinstance(layer, Medium) else None for layer in self.layers)
 
     @property
     def interfaces(self) -> tuple[Interface, ...]:

@@ -211,8 +211,12 @@ def inverse(stack: Stack, seed: int, model: str = DEFAULT, **switches: str) -> A
     found = stack_lobes(solution.stack, 1.0, 0.0, model, **switches)
     layers = Material.of(solution.stack).layers
     surfaces = [layer for layer in layers if isinstance(layer, InterfaceValues)]
-    above = [before if isinstance(before, SlabValues) else None for before, layer in zip((None, *layers), layers)]
-    tau = [m.tau_a if m else 0.0 for m, layer in zip(above, layers) if isinstance(layer, InterfaceValues)]
+    tau = [0.0]
+    for layer in layers:
+        if isinstance(layer, SlabValues):
+            tau[-1] = tau[-1] + layer.tau_a
+        elif isinstance(layer, InterfaceValues):
+            tau.append(0.0)
     coloured, along = ("interface", "colour"), ("interface", "axis")
     return {
         "asked_energy": (coloured, np.array(asked.energy)[..., 0]),
@@ -222,7 +226,7 @@ def inverse(stack: Stack, seed: int, model: str = DEFAULT, **switches: str) -> A
         "eta": (coloured, _coloured([layer.eta for layer in surfaces])),
         "k": (coloured, _coloured([layer.k for layer in surfaces])),
         "own_alpha": (along, np.array([(layer.alpha_u, layer.alpha_v) for layer in surfaces])),
-        "depth": (coloured, _coloured(tau)),
+        "depth": (coloured, _coloured(tau[: len(surfaces)])),
     }
 
 

@@ -210,14 +210,18 @@ def _of_some(stack: Stack, kept: Sequence[int]) -> Stack:
 
 
 def _merged(media: Sequence[Medium]) -> Medium:
-    """One medium of depth 1 with the optical depths of several, clear where there is none, and their mean g."""
+    """One medium of depth 1 with the optical depths of several, clear where there is none, and their phase function,
+    or else Henyey and Greenstein's of their mean asymmetry."""
     absorbed, scattered = (
         np.array([np.broadcast_to(getattr(medium, key), 3) * medium.depth for medium in media]).reshape(-1, 3)
         for key in ("sigma_a", "sigma_s")
     )
     often = scattered.mean(axis=1)
-    g = np.average([medium.g for medium in media], weights=often) if often.sum() > 0 else 0.0
     sigma_a, sigma_s = (written(depths.sum(axis=0)) for depths in (absorbed, scattered))
+    phases = {medium.phase for medium, depth in zip(media, often) if depth > 0}
+    if len(phases) == 1 and (phase := phases.pop()):
+        return Medium(sigma_a=sigma_a, sigma_s=sigma_s, phase=phase)
+    g = np.average([medium.written("g") for medium in media], weights=often) if often.sum() > 0 else 0.0
     return Medium(sigma_a=sigma_a, sigma_s=sigma_s, g=float(g))
 
 

@@ -104,8 +104,9 @@ class Layers(Batch):
         media: list[Layer] = [] if np.max(tau) == 0 else [Medium(sigma_a=tau)]
         if self.scatters is not None:
             own = dataclasses.replace(self, tau=absorbs).medium
-            keys = {key: _plain(value, n) for key, value in vars(own).items()}
-            media = [Medium(**keys)]
+            left_out = "phase" if own.phase is None else "g"
+            keys = {key: value for key, value in vars(own).items() if key != left_out}
+            media = [Medium(**{key: value if key == "phase" else _plain(value, n) for key, value in keys.items()})]
         brushed = abs(u - v) > ROUND
         alpha = (u, v) if brushed else u if u == v else (u + v) / 2
         index = {"conductor": "mirror"} if self.kind == "mirror" else {"eta": eta, "k": kappa}

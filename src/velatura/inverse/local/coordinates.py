@@ -659,6 +659,8 @@ def plain(stack: Stack) -> list[Layers]:
     material = Material.of(stack, lambda at, value: value if at.layer == base else number(at, value))
     for n, layer in enumerate(material.layers[:base]):
         if isinstance(layer, MediumValues):
+            if n and isinstance(material.layers[n - 1], MediumValues):
+                raise InvalidInput(f"layer {n} (medium): a target has one medium above an interface, not two in a row")
             tau = np.broadcast_to(layer.sigma_a * layer.depth, (3, 1))
             scatters = layer if np.any(layer.sigma_s * layer.depth > 0) else None
             continue

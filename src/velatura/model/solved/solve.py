@@ -20,6 +20,7 @@ from velatura.model.solved.bsdf import ROOTS, Shape, Side, Solved
 from velatura.model.solved.columns import Columns, Declaration
 from velatura.model.solved.energies.adding import Part, interfaces, parts
 from velatura.model.solved.energies.energies import INCIDENCES, SAMPLES, Energies, energies, media_of
+from velatura.model.solved.energies.media import Slab
 from velatura.model.solved.grid import Folded, Grid, Listed
 from velatura.model.solved.guards import ALBEDO_MIN, COS_ON_GRID_MIN, ENERGY_EPS, WIDTH_ALPHA_MAX
 from velatura.model.solved.lobes import refracted_lobe, remainder, widths
@@ -624,8 +625,9 @@ def _veiled(material: Material) -> set[int]:
     above, k = False, 0
     for layer in material.layers:
         if isinstance(layer, SlabValues):
-            events = max(map(widths.nearly_straight, np.ravel(layer.g).tolist())) * np.max(layer.tau_s)
-            above = above or bool(events > VEIL_MIN)
+            slab = Slab.of(layer, 1.0, widths.nearly_straight)
+            assert slab.straight is not None
+            above = above or bool(slab.straight * np.max(slab.tau_s) > VEIL_MIN)
         elif isinstance(layer, InterfaceValues):
             veiled |= {k} if above else set()
             k += 1

@@ -307,7 +307,7 @@ def _eventful(material: Material) -> Material:
 
     def eventful(k: int, layer: Any) -> Any:
         if isinstance(layer, MediumValues):
-            return replace(layer, depth=depth, sigma_s=np.ones((3, 1)), g=g)
+            return replace(layer, depth=depth, sigma_s=np.ones((3, 1)), g=g, phase=None)
         dielectric = isinstance(layer, InterfaceValues) and layer.kind == "dielectric"
         return replace(layer, eta=material.exterior * (1.5 + 0.1 * k)) if dielectric else layer
 

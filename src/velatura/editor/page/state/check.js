@@ -43,6 +43,7 @@ function refusal(value, spec, names) {
     if (!Array.isArray(value)) return 'must be a list of films';
     return value.length > spec.most ? `must be at most ${spec.most} films` : '';
   }
+  if (kind === 'phase') return 'phase functions need Python';
   if (kind === 'choice') return options.includes(value) ? '' : `must be one of ${options.join(', ')}`;
   if (value !== null && typeof value === 'object' && !Array.isArray(value)) return 'textures and spectra need Python';
   if (kind === 'index' && typeof value === 'string')

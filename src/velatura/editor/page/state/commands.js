@@ -170,6 +170,13 @@ export const setValue = titled('change a value', (state, id, key, value) =>
   changed(state, id, ({ keys }) => ({ keys: { ...keys, [key]: value } })),
 );
 
+/** Gives a medium a phase function, whose asymmetry takes the place of g; without one it is that of g. */
+export const setPhase = titled('change a phase function', (state, id, phase) =>
+  changed(state, id, ({ keys: { g, phase: old, ...keys } }) => ({
+    keys: phase === undefined ? keys : { ...keys, phase },
+  })),
+);
+
 // Films of an interface, by their number from the top -------------------------------------------------
 
 /** Changes the list of films of a layer; none is no key. */

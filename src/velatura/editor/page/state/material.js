@@ -63,7 +63,7 @@ export function flat(state, { names, schema }) {
 function numbersOf(keys, parameters, names) {
   const found = Object.entries(parameters).flatMap(([key, { kind, default: standard }]) => {
     const value = keys[key] ?? standard;
-    if (kind === 'films') return [];
+    if (kind === 'films' || (key === 'g' && keys.phase !== undefined)) return []; // that asymmetry Python knows
     if (kind === 'pair') return axes(value).map((one, axis) => [`${key}_${'uv'[axis]}`, one]);
     if (kind !== 'index') return [[key, value]];
     return keys.conductor === 'mirror' ? [] : [[key, indices(keys.conductor ?? value, key, names)]];
@@ -92,6 +92,7 @@ export function pattern(state) {
       .filter(([key, value]) => key !== 'films' && typeof shape(value) === 'object')
       .map(([key, value]) => [key, shape(value)]),
     films(keys), // of which code knows no more
+    keys.phase ?? 0, // whose asymmetry Python knows
   ]);
   return JSON.stringify([state.thin, layers]);
 }

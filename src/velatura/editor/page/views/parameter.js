@@ -2,7 +2,7 @@
 
 import { html, nothing } from 'lit-html';
 import { axes, enabled, indices, isOpaque, variantOf } from '../state/material.js';
-import { setValue } from '../state/commands.js';
+import { setPhase, setValue } from '../state/commands.js';
 import { channelsOf, colour, tint } from './colour.js';
 import { dial, iconButton, menu, number, numberField, texture } from './controls.js';
 import { films } from './films.js';
@@ -18,6 +18,7 @@ const NAMES = {
   sigma_a: 'Absorption',
   sigma_s: 'Scattering',
   g: 'Forward (g)',
+  phase: 'Phase function',
   albedo: 'Albedo',
   films: 'Thin films',
   thickness_nm: 'Thickness',
@@ -34,6 +35,7 @@ const INDICES = { dielectric: ['eta'], metal: ['conductor'], custom: ['eta', 'k'
 /** Which parameters a layer shows: of the indices, an interface has those of its kind only. */
 export function parametersOf(layer, schema) {
   const all = Object.keys(schema[layer.kind]);
+  if (layer.kind === 'medium' && layer.keys.phase !== undefined) return all.filter((key) => key !== 'g');
   if (layer.kind !== 'interface') return all;
   const hidden = Object.values(INDICES).flat();
   return [...INDICES[variantOf(layer)], ...all.filter((key) => !hidden.includes(key))];
@@ -102,6 +104,7 @@ const FORMS = {
   index,
   pair,
   angle,
+  phase,
   films: (context) => films({ ...context, row: (given) => row(context.services, given) }),
   choice: ({ services, label, value, edit }) => {
     const groups = metals(services.session.names);
@@ -219,6 +222,46 @@ function angle(context) {
       : html`${brushing}
           <div class="pairs">${['u', 'v', 'offset'].map(part)}</div>`,
     extras: textureButton(context),
+  };
+}
+
+const PHASES = { // of a new one
+  rayleigh: ['Rayleigh', 'rayleigh'],
+  two_lobes: ['Two lobes', { forward: 0.8, backward: -0.3, share: 0.8 }],
+  mie: ['Spheres (Mie)', { eta: 1.5, radius_um: 0.5 }],
+};
+
+/** The kind of a phase function, as its record is called. */
+function kindOf(phase) {
+  if (typeof phase !== 'object') return phase;
+  return phase.forward !== undefined ? 'two_lobes' : phase.table !== undefined ? 'phase_table' : 'mie';
+}
+
+/** A phase function: by g, or another one by its numbers; a table stays as it is. */
+function phase({ services, layer, label, value, edit, records }) {
+  const { store, lacks } = services;
+  const kind = value === null ? 'g' : kindOf(value);
+  const none = lacks('phase');
+  const options = [['g', 'Henyey-Greenstein'], ...Object.entries(PHASES).map(([name, [title]]) => [name, title, none])];
+  if (kind === 'phase_table') options.push([kind, 'Table']);
+  const choose = (name) => store.run(setPhase, layer.id, PHASES[name]?.[1]);
+  const part = (key) => {
+    const one = {
+      ...edit,
+      set: (next) => edit.set({ ...value, [key]: next }),
+      move: (next) => edit.move({ ...value, [key]: next }),
+    };
+    const spec = records[kind][key];
+    return html`<label title=${spec.doc}
+      >${key} ${numberField({ label: `${label}, ${key}`, value: value[key] ?? spec.default, spec, edit: one })}</label
+    >`;
+  };
+  const numbers = value !== null && records[kind] ? Object.keys(records[kind]) : [];
+  const given = numbers.filter((key) => (value[key] ?? records[kind][key].default) !== null);
+  return {
+    control: html`${menu({ label, value: kind, options, choose })}
+      <div class="pairs">${given.map(part)}</div>`,
+    extras: nothing,
   };
 }
 

@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import functools
 import operator
-from collections.abc import Callable, Hashable, Iterator, Sequence
+from collections.abc import Hashable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any, NamedTuple, TypeVar
@@ -24,8 +24,9 @@ from velatura.films.of_material import films_of
 from velatura.films.tables import Coated
 from velatura.model.rough_interface import KEPT, Facets, colours
 from velatura.model.solved.energies.interfaces import Setting, interface
-from velatura.model.solved.energies.media import Slab, medium
+from velatura.model.solved.energies.media import Slab, Straight, medium
 from velatura.model.solved.energies.operators import Functional, Layer, Operator
+from velatura.optics.phase import PhaseFunction
 from velatura.stack import InterfaceValues, Material, SlabValues
 from velatura.stack.chain import chain
 
@@ -131,7 +132,9 @@ def layer(part: Part, setting: Setting) -> tuple[Layer, Layer]:
     """A layer where facets are met once, and as the setting says, kept for other materials that have one like it."""
 
     def key(value: Any) -> Hashable:
-        return value.key if isinstance(value, Coated) else None if value is None else np.asarray(value).tobytes()
+        if isinstance(value, Coated | PhaseFunction):
+            return value.key
+        return None if value is None else np.asarray(value).tobytes()
 
     def made() -> tuple[Layer, Layer]:
         basis = setting.basis
@@ -161,11 +164,11 @@ def _lambert(part: Lambert, setting: Setting) -> Layer:
     return Layer(r, nothing, nothing, nothing)
 
 
-def parts(material: Material, straight: Callable[[float], float] | None = None) -> list[Part]:
+def parts(material: Material, straight: Straight | None = None) -> list[Part]:
     """The layers of a material with values in NumPy, indices relative to the outside above.
 
-    `straight` gives the share of scattered light that goes straight on by the asymmetry g, for light that is in a lobe;
-    None follows all light.
+    `straight` gives the share of scattered light that goes straight on by the phase function, for light that is in a
+    lobe; None follows all light.
     """
     outside = float(ops.mean(colours(material.exterior)))
     found: list[Part] = []

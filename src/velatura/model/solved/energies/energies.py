@@ -8,7 +8,7 @@ inside a denser medium. What the first system reflects besides is the remainder.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -29,7 +29,7 @@ from velatura.model.solved.energies.adding import (
     settings,
 )
 from velatura.model.solved.energies.interfaces import Setting
-from velatura.model.solved.energies.media import Slab
+from velatura.model.solved.energies.media import Slab, Straight
 from velatura.model.solved.energies.modes import Basis, Even, Relative
 from velatura.model.solved.energies.nodes import Nodes
 from velatura.model.solved.guards import TINY
@@ -44,8 +44,6 @@ MODES = 3  # of the azimuth, of the remainder
 CANCELS = 0.3  # of columns of light: a sum that is less
 INCIDENCES = np.sqrt((np.arange(8) + 0.5) / 8)  # cosines at which the remainder is known
 AZIMUTHS = np.pi * np.arange(4) / 4  # over which it is averaged, where interfaces are brushed
-
-Straight = Callable[[float], float]  # share of scattered light that counts as going straight on, by asymmetry
 
 
 @dataclass(frozen=True)
@@ -118,7 +116,7 @@ def energies(
         met = zip(found, of, each)
         return Leaving.of([layer(x, y)[0] if isinstance(x, Slab) else of_it[as_set] for x, y, of_it in met], setting)
 
-    clear = _ended(parts(material, lambda g: 0.0))
+    clear = _ended(parts(material, lambda _: 0.0))
     sharp = system(clear) if scatters or often else full
     kept = system(_ended(parts(material, forward))) if scatters else sharp
     # A lobe has all that media do not scatter where nothing above it refracts, and else a share of it

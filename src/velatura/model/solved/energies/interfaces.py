@@ -22,6 +22,7 @@ from velatura.model.rough_interface import DIGITS, KEPT, Facets, FirstEvents, Fi
 from velatura.model.solved.energies.modes import Basis
 from velatura.model.solved.energies.operators import Layer, Operator
 from velatura.model.solved.guards import TINY, TRACE
+from velatura.renderer.low_discrepancy import fibonacci
 from velatura.tables import Tables
 
 Array = NDArray[np.floating]
@@ -166,7 +167,9 @@ class _Met:
     def _of(cls, facets: Facets, p: Array, psi: Array, setting: Setting) -> _Met:
         again = facets.across > 0 and setting.often is not None
         events = FirstEvents(facets, tuple(setting.ways), again)
-        lights, others = setting.basis.deposited(events, p, psi, setting.samples, events.numbers(setting.samples))
+        lights, others = setting.basis.deposited(
+            events, p, psi, fibonacci(setting.samples), events.numbers(setting.samples)
+        )
         # Stencils keep the energy
         totals = [light[-events.colours :, 0].sum(axis=1) for light in lights]
         shares = FirstShares.beside(facets, totals, others)

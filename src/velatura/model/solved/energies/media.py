@@ -1,4 +1,4 @@
-"""Media as operators on light, by doubling thin layers with events of Henyey & Greenstein's phase function."""
+"""Media as operators on light, by doubling thin layers with events drawn from their phase functions."""
 
 from __future__ import annotations
 
@@ -11,16 +11,19 @@ import numpy as np
 from numpy.typing import NDArray
 
 from velatura import ops
+from velatura.media.of_material import phase_of
 from velatura.model.rough_interface import Light, colours
 from velatura.model.solved.energies.interfaces import Setting, scaled
 from velatura.model.solved.energies.operators import Layer, Operator
 from velatura.model.solved.guards import COS_IN_MEDIA_MIN, G_MAX, SIN_IN_MEDIA_MAX, TINY
 from velatura.ops import Value
-from velatura.optics import phase
+from velatura.optics.phase import HenyeyGreenstein, PhaseFunction, deflect
 from velatura.renderer.low_discrepancy import fibonacci
 from velatura.stack import SlabValues
 
 Array = NDArray[np.floating]
+
+Straight = Callable[[PhaseFunction], float]  # share of scattered light that counts as going straight on
 
 THIN = 1e-4  # depth of the first layer, which scatters once at most: errors go as this depth
 EVENTS = 600
@@ -28,7 +31,7 @@ EVENTS = 600
 
 @dataclass(frozen=True)
 class Slab:
-    """A medium of index n, by optical depths of absorption and scattering along the normal (C,), and asymmetry g (C,).
+    """A medium of index n, by optical depths of absorption and scattering along the normal (C,), and phase function.
 
     `straight` is the share of scattered light that counts as going straight on, where no other scattered light is
     followed; None to follow it all.
@@ -37,20 +40,23 @@ class Slab:
     n: float
     tau_a: Array
     tau_s: Array
-    g: Array
-    straight: Array | None = None
+    phase: PhaseFunction
+    straight: float | None = None
 
     @classmethod
-    def of(cls, layer: SlabValues, n: float, straight: Callable[[float], float] | None) -> Slab:
-        """A medium of NumPy's values; `straight` gives the share that goes straight on by the asymmetry g."""
-        tau_a, tau_s, g = (colours(x) for x in (layer.tau_a, layer.tau_s, layer.g))
-        return cls(n, tau_a, tau_s, g, None if straight is None else np.array([straight(x) for x in g]))
+    def of(cls, layer: SlabValues, n: float, straight: Straight | None) -> Slab:
+        """A medium of NumPy's values; `straight` gives the share that goes straight on by the phase function."""
+        tau_a, tau_s = colours(layer.tau_a), colours(layer.tau_s)
+        phase = phase_of(layer)
+        if isinstance(phase, HenyeyGreenstein):
+            phase = HenyeyGreenstein(float(np.mean(phase.g)))
+        return cls(n, tau_a, tau_s, phase, None if straight is None else straight(phase))
 
 
 def medium(slab: Slab, setting: Setting) -> Layer:
     """A medium as a layer; it looks alike from both sides."""
     slab = _resolved(slab)
-    lost = slab.tau_a + (slab.tau_s if slab.straight is None else (1 - slab.straight) * slab.tau_s)
+    lost = slab.tau_a + (1 - (slab.straight or 0.0)) * slab.tau_s
     if slab.straight is not None or not slab.tau_s.any():
         t = scaled(partial(_kept, slab, lost), setting)
         nothing = Operator.nothing(setting.basis.size, len(setting.p))
@@ -64,10 +70,9 @@ def medium(slab: Slab, setting: Setting) -> Layer:
 
 
 def _resolved(slab: Slab) -> Slab:
-    """The slab whose light goes straight on where it turns by less than nodes resolve: (1 - g) tau_s stays (van de
-    Hulst's similarity relation)."""
-    g = np.clip(slab.g, -G_MAX, G_MAX)
-    return replace(slab, tau_s=slab.tau_s * np.minimum((1 - slab.g) / (1 - g), 1), g=g)
+    """The slab whose light goes straight on where it turns by less than nodes resolve."""
+    phase, share = slab.phase.widened(G_MAX)
+    return replace(slab, tau_s=slab.tau_s * share, phase=phase)
 
 
 def _thin(slab: Slab, depth: Array, setting: Setting) -> tuple[Operator, Operator]:
@@ -93,25 +98,20 @@ def _kept(slab: Slab, depth: Array, p: Array) -> Array:
 
 
 def _scattered(slab: Slab, p: Array, psi: Array, setting: Setting) -> tuple[Array, ...]:
-    """Light that is scattered up, and down, of light of one unit that travels down, (G, modes, N, S), for the
-    asymmetry of each colour, or 1 for all; kept for other media."""
-    # Colours share the directions that they scatter into, where they share g
-    alike = len(set(slab.g.tolist())) == 1
-
-    def scattered(g: float) -> list[Array]:
-        numbers = slab.n, g, 1 / len(fibonacci(EVENTS)[0])
-        key = _scattered, *numbers, p.tobytes(), psi.tobytes(), setting.basis.nodes.ends
-        return setting.kept(key, lambda: setting.basis.deposited(_events, p, psi, EVENTS, numbers)[0])
-
-    each = map(scattered, (slab.g[:1] if alike else slab.g).tolist())
-    return tuple(np.concatenate(lights) for lights in zip(*each))
+    """Light that is scattered up, and down, of light of one unit that travels down, (1, modes, N, S); kept for other
+    media."""
+    u_1, u_2 = fibonacci(EVENTS)
+    numbers = slab.n, 1 / len(u_1)
+    key = _scattered, *numbers, slab.phase.key, p.tobytes(), psi.tobytes(), setting.basis.nodes.ends
+    lattice = slab.phase.sample(u_1), u_2
+    return tuple(setting.kept(key, lambda: setting.basis.deposited(_events, p, psi, lattice, numbers)[0]))
 
 
 def _events(
     sources: Sequence[Value], samples: Sequence[Value], numbers: Sequence[Value]
 ) -> tuple[list[Light], list[Value]]:
-    (p, psi), (u_1, u_2), (n, g, share) = sources, samples, numbers
+    (p, psi), (cosine, u_2), (n, share) = sources, samples, numbers
     sin = ops.minimum(p / n, SIN_IN_MEDIA_MAX)
     w = sin * ops.cos(psi), sin * ops.sin(psi), ops.sqrt(1 - sin * sin)
-    x, y, z = phase.deflect(w, phase.sample_henyey_greenstein(g, u_1), 2 * pi * u_2)
+    x, y, z = deflect(w, cosine, 2 * pi * u_2)
     return [Light(n * x, n * y, [ops.select(there, share, 0.0)]) for there in (z <= 0, z > 0)], []

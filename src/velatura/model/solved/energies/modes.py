@@ -26,7 +26,6 @@ from velatura.model.solved.energies.operators import Operator
 from velatura.model.solved.guards import MOMENTUM_MIN
 from velatura.ops import Value
 from velatura.renderer import compiled
-from velatura.renderer.low_discrepancy import fibonacci
 
 Array = NDArray[np.floating]
 
@@ -71,7 +70,7 @@ class Basis(ABC):
         """Whether modes change sign in half a turn."""
 
     def deposited(
-        self, scatter: Scatter, p: Array, psi: Array, samples: int, numbers: Sequence[Any]
+        self, scatter: Scatter, p: Array, psi: Array, samples: Sequence[Array], numbers: Sequence[Any]
     ) -> tuple[list[Array], Array]:
         """Sums over the samples of sources of lengths p at azimuths psi (S,): of each light the K weights by mode and
         node, (K, modes, N, S), and of other values, (L, S)."""
@@ -92,7 +91,7 @@ class Basis(ABC):
         def sums(groups: list[Array]) -> list[Array]:
             return [self._sums(*groups[k : k + 4]) for k in range(0, len(groups), 4)]
 
-        return compiled.over(function, (p, psi), fibonacci(samples), [*parts, *numbers], sums)
+        return compiled.over(function, (p, psi), samples, [*parts, *numbers], sums)
 
     def _sums(self, first: Array, shares: Array, azimuth: Array, weights: Array) -> Array:
         """Sums of weights (S, samples, K) by mode and node, for stencils that begin at nodes `first`, at azimuths by

@@ -15,6 +15,7 @@ Values are NumPy's, for directions (M,).
 
 from __future__ import annotations
 
+import functools
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
@@ -33,11 +34,13 @@ from velatura.model.solved.lobes.refracted_lobe import Reflectance, RefractedLob
 from velatura.model.variance import Roughness
 from velatura.ops import Value
 from velatura.optics import fresnel
+from velatura.optics.phase import HenyeyGreenstein, PhaseFunction
 
 Array = NDArray[np.floating]
 
 NEARLY_STRAIGHT = 0.2  # radians; by how much light of a veil is turned at most, in one event
-ASYMMETRY_MIN = 0.05  # of media that have a veil
+SHARE_MIN = HenyeyGreenstein(0.05).within(NEARLY_STRAIGHT)  # of media that have a veil
+HALVINGS = 30  # of an angle, to a part of 10^9
 COARSE = 144  # normals
 AXES = (0.0, 0.5 * np.pi)  # of a tensor
 LEAST_STEP = 0.02  # of the logarithm of the index, that counts at all
@@ -290,30 +293,32 @@ def veil(found: Sequence[Part], k: int, cos_theta: Array, tensor: Tensor) -> Ten
         above += isinstance(part, Facets)
         if above > k or not isinstance(part, Slab):
             continue
-        g = float(ops.mean(part.g))
         cosine = _cosine(cos_theta, part.n)
-        events = 2 * nearly_straight(g) * ops.mean(part.tau_s) / cosine
+        events = 2 * nearly_straight(part.phase) * ops.mean(part.tau_s) / cosine
         mean = mean + events
-        width = width + events * _of_event(g) * part.n * cosine / (n * _cosine(cos_theta, n))
+        width = width + events * _of_event(part.phase) * part.n * cosine / (n * _cosine(cos_theta, n))
     width = width / np.maximum(-np.expm1(-mean), np.finfo(float).tiny)  # model.md, Eq. 7
     scattered = Tensor(width**2, np.zeros_like(width), width**2)
     return _sum([tensor, scattered])
 
 
-def nearly_straight(g: float) -> float:
-    """Share of the scattered light of a medium of asymmetry g that is deflected by little, and stays in a veil."""
-    if g <= ASYMMETRY_MIN:
-        return 0.0
-    chord = np.sqrt(1 + g * g - 2 * g * np.cos(NEARLY_STRAIGHT))
-    return float((1 - g * g) / (2 * g) * (1 / (1 - g) - 1 / chord))
+@functools.lru_cache(256)
+def nearly_straight(phase: PhaseFunction) -> float:
+    """Share of the scattered light of a medium that is deflected by little, and stays in a veil; none of what hardly
+    has a peak forwards."""
+    share = phase.within(NEARLY_STRAIGHT)
+    return share if share > SHARE_MIN else 0.0
 
 
-def _of_event(g: float) -> float:
+@functools.lru_cache(256)
+def _of_event(phase: PhaseFunction) -> float:
     """Width in slopes of one event of a veil: half the median angle."""
-    if g <= ASYMMETRY_MIN:
-        return 0.0
-    chord = 1 / (1 / (1 - g) - g * nearly_straight(g) / (1 - g * g))
-    return float(0.5 * np.arccos((1 + g * g - chord * chord) / (2 * g)))
+    share = 0.5 * nearly_straight(phase)
+    low, high = 0.0, NEARLY_STRAIGHT
+    for _ in range(HALVINGS):
+        middle = 0.5 * (low + high)
+        low, high = (middle, high) if phase.within(middle) < share else (low, middle)
+    return 0.25 * (low + high) if share > 0 else 0.0
 
 
 def _cosine(cos_theta: Value, n: Value) -> Value:

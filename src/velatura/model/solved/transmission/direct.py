@@ -27,7 +27,7 @@ from __future__ import annotations
 
 import operator
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, is_dataclass
+from dataclasses import dataclass, is_dataclass, replace
 from functools import reduce
 from itertools import accumulate
 from math import pi
@@ -107,6 +107,16 @@ class CrossedSlab(ops.NamedFields):
     def is_clear(self) -> bool:
         return isinstance(self.depth, float) and self.depth == 0.0
 
+    def over(self, other: CrossedSlab) -> CrossedSlab:
+        """This and another medium below it as one, of the mean asymmetry of what they scatter."""
+        if is_none(self.scattering):
+            return other if self.is_clear else replace(other, depth=self.depth + other.depth)
+        if is_none(other.scattering):
+            return replace(self, depth=self.depth + other.depth)
+        here, there = ops.mean(self.scattering), ops.mean(other.scattering)
+        g = ops.divide(here * self.g + there * other.g, here + there)
+        return CrossedSlab(self.depth + other.depth, self.scattering + other.scattering, g)
+
 
 @dataclass(frozen=True)
 class Transmission:
@@ -149,7 +159,7 @@ def transmission(
         if isinstance(layer, SlabValues):
             tau_s = layer.tau_s
             clear = is_none(tau_s) if cloudy is None else len(refractions) not in cloudy
-            slabs[-1] = CrossedSlab(layer.tau_a + tau_s, 0.0 if clear else tau_s, ops.mean(layer.g))
+            slabs[-1] = slabs[-1].over(CrossedSlab(layer.tau_a + tau_s, 0.0 if clear else tau_s, ops.mean(layer.g)))
             continue
         assert isinstance(layer, InterfaceValues) and layer.kind == "dielectric"
         refractions.append(_crossing(layer, meeting.above, n, kind, meeting.films))

@@ -1,0 +1,1 @@
+"""Phase functions of the media of a material."""
