@@ -79,7 +79,7 @@ def modelled(stack: Stack, cosines: Array, often: bool) -> Array:
     solved = energies(material, all_cosines, 0 * all_cosines, known, widths.nearly_straight)
     lobes, veils, rest = (x[..., : len(cosines)] for x in (solved.lobes, solved.veils, solved.rest))
     albedos = (solved.lobes.sum(axis=0) + solved.veils.sum(axis=0) + solved.rest)[:, len(cosines) :]
-    polynomial = remainder.fit(solved.nodes, solved.remainder, INCIDENCES, np.broadcast_to(albedos, (len(rest), 8)))
+    polynomial, _ = remainder.fit(solved.nodes, solved.remainder, INCIDENCES, np.broadcast_to(albedos, (len(rest), 8)))
     by_colour = Remainder(*(np.reshape(number, (-1, 1)) for number in vars(polynomial).values()))
     tensors = widths.tensors(found, cosines, phi, lobes.mean(axis=1))
 

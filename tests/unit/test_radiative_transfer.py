@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+import slab_radiances
 from radiative_transfer import KNOWN, rows
 
 from velatura.model import named
@@ -41,3 +42,13 @@ def test_radiance_of_a_slab_is_that_of_van_de_hulst(form: str, part: str, side: 
         wo = np.sqrt(1 - mu * mu) * np.cos(phi), np.sqrt(1 - mu * mu) * np.sin(phi), side * mu + 0 * mu_0
         value, _ = body.eval_pdf(wi, wo)
         assert np.pi * value[0] / mu == pytest.approx(np.array(known[part]["value"]), rel=bound)
+
+
+@pytest.mark.parametrize("form", ["forward", "symmetric"])
+def test_values_of_slabs_are_those_of_disort(form: str) -> None:
+    """Bounds are those of `benchmarks/slabs.py`, where all cases are."""
+    some = [case for case in slab_radiances.cases() if case.medium.depth == 1 and case.medium.sigma_s == 0.9]
+    reflected = np.array([slab_radiances.errors(case, form)[0] for case in some])
+    most = {"Rayleigh": 0.01, "g 0": 0.01, "g 0.5": 0.035, "g 0.8": 0.12, "g 0.9": 0.2}
+    assert np.all(reflected < [most[case.name] for case in some])
+    assert reflected.mean() < 0.05

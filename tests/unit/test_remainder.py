@@ -78,7 +78,7 @@ def test_what_is_a_polynomial_is_found_again() -> None:
             return Remainder(*numbers).value(wi, wo) / wo[2]
 
         light = measures(polynomial)
-        found = remainder.fit(NODES, light, COSINES, np.ones((1, 8)))
+        found, _ = remainder.fit(NODES, light, COSINES, np.ones((1, 8)))
         np.testing.assert_allclose(np.concatenate(list(vars(found).values())), numbers, atol=2e-3)
 
 
@@ -106,7 +106,7 @@ def test_a_diffuse_base_under_a_smooth_coat_is_close_to_a_polynomial() -> None:
         return (1 - fresnel.dielectric(wi[2], 1.5)) * (1 - fresnel.dielectric(wo[2], 1.5)) / np.pi
 
     light = measures(coated)
-    found = remainder.fit(NODES, light, COSINES, light[:, 0].sum(axis=1))
+    found, _ = remainder.fit(NODES, light, COSINES, light[:, 0].sum(axis=1))
     z = np.sqrt((np.arange(1000) + 0.5) / 1000)
     mean = np.mean(1 - fresnel.dielectric(z, 1.5))
     for cosine in (1.0, 0.7, 0.35):
@@ -124,7 +124,7 @@ def test_it_takes_what_media_and_facets_scatter() -> None:
     rough = [Interface(eta=1.5, alpha=0.5), Interface(conductor="mirror", alpha=0.4)]
     for layers, often in ((paint, None), (rough, tables.load())):
         solved = energies(Material.of(Stack(layers)), cosines, 0 * cosines, often, lambda g: 0.0)
-        found = remainder.fit(solved.nodes, solved.remainder, INCIDENCES, np.ones((1, len(INCIDENCES))))
+        found, _ = remainder.fit(solved.nodes, solved.remainder, INCIDENCES, np.ones((1, len(INCIDENCES))))
         np.testing.assert_allclose(found.albedo(cosines), solved.rest[0], atol=5e-3)
         assert found.b > 0
 
@@ -218,3 +218,17 @@ def test_columns_of_rounding_are_not_scaled_up() -> None:
         baked = record(metal).baked
         assert isinstance(baked, SolvedLookUp) and baked.solved
         assert np.abs(baked.solved.remainder).max() < 1e-4
+
+
+def test_functions_beside_it_are_fitted_with_it_and_none_is_negative() -> None:
+    """Expected: the shares of what light is made of; of what would have a negative one, nothing."""
+    light = measures(lambda wi, wo: SOME.value(wi, wo) / wo[2])
+    one, other = (np.random.default_rng(5).uniform(0, 0.02, (2, *light.shape))) * (1 + light)
+    albedos = np.ones((1, len(COSINES)))
+    alone, none = remainder.fit(NODES, light, COSINES, albedos)
+    found, shares = remainder.fit(NODES, light + 0.7 * one, COSINES, albedos, [one, other])
+    assert none.shape == (0, 1)
+    assert shares[:, 0] == pytest.approx([0.7, 0.0], abs=0.02)
+    np.testing.assert_allclose(list(vars(found).values()), list(vars(alone).values()), atol=0.02)
+    _, shares = remainder.fit(NODES, light - 0.5 * one, COSINES, albedos, [one, other])
+    assert shares[0, 0] == 0 <= shares[1, 0]

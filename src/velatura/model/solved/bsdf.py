@@ -22,9 +22,10 @@ from velatura.model.roughness_maps import RoughnessMap
 from velatura.model.smooth_interface import SmoothInterface
 from velatura.model.solved.columns import Column, Columns, Declaration
 from velatura.model.solved.guards import BELOW_ONE, COS_OF_DIRECTIONS_MIN, ENERGY_EPS
-from velatura.model.solved.lobes import refracted_lobe
+from velatura.model.solved.lobes import refracted_lobe, top_medium
 from velatura.model.solved.lobes.refracted_lobe import MediumIndex, RefractedLobe
 from velatura.model.solved.lobes.remainder import Remainder, RemainderSamples
+from velatura.model.solved.lobes.top_medium import TopMedium, TopSamples
 from velatura.model.solved.transmission import combined
 from velatura.model.solved.transmission.combined import Parts
 from velatura.model.solved.transmission.direct import Transmission
@@ -74,17 +75,18 @@ class Shape:
 class Side:
     """One side of a solved material, in a renderer's numbers; a colour is made of `colours` channels.
 
-    The remainder is drawn by `samples`.
+    The remainder is drawn by `samples`. With it goes what the medium `top` scatters back, None where none is apart.
     """
 
     curves: Any
     shapes: tuple[Shape, ...]
     polynomial: Remainder
-    samples: RemainderSamples
+    samples: RemainderSamples | TopSamples
     transmission: Transmission | None
     colour: Callable[..., Value]
     colours: int
     kind: type[Variance]
+    top: TopMedium | None = None
 
     @property
     def declaration(self) -> Declaration:
@@ -133,7 +135,7 @@ class Side:
         lobes = [shape.lobe(weight, self.kind(*numbers).roughness(ROOTS)) for shape, weight, numbers in every]
         # The axes of isotropic interfaces lie in the plane of incidence
         plane = ggx.plane(w) if self.kind is PerAxis else None
-        return SideView(self.shapes, lobes, plane, self.polynomial, self.samples, self.transmission, columns)
+        return SideView(self.shapes, lobes, plane, self.polynomial, self.samples, self.transmission, columns, self.top)
 
 
 @dataclass(frozen=True)
@@ -147,9 +149,10 @@ class SideView:
     lobes: list[RefractedLobe]
     plane: tuple[Value, Value] | None
     polynomial: Remainder
-    samples: RemainderSamples
+    samples: RemainderSamples | TopSamples
     transmission: Transmission | None
     columns: Columns
+    top: TopMedium | None
 
     def turned(self, w: Direction, by: Direction) -> Direction:
         """A direction as this side sees it; all light comes from above where nothing passes."""
@@ -199,7 +202,9 @@ class SideView:
         """f |cos theta_o| and density of a reflected part."""
         if k < len(self.lobes):
             return refracted_lobe.eval_pdf(self.lobes[k], self._along_plane(i), self._in_plane(o))
-        return self.columns.scale * self.polynomial.value(i, o), self.samples.density(i, o)
+        top = self.top
+        rest = self.polynomial.value(i, o) if top is None else top_medium.value(self.polynomial, top, i, o)
+        return self.columns.scale * rest, self.samples.density(i, o)
 
     def out_of(self, lobe: RefractedLobe, i: Direction, u1: Value, u2: Value) -> Direction:
         """A direction drawn from a lobe."""
@@ -269,6 +274,7 @@ class Solved:
             shapes=tuple(_either(where, a, b) for a, b in zip(self.above.shapes, self.below.shapes)),
             polynomial=ops.select_record(where, self.above.polynomial, self.below.polynomial),
             samples=ops.select_record(where, self.above.samples, self.below.samples),
+            top=ops.select_record(where, self.above.top, self.below.top),
             transmission=ops.select_record(where, self.above.transmission, self.below.transmission),
         )
         return side.given(turned, columns), ops.select(where, self.eta, 1 / self.eta)

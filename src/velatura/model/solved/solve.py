@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Sequence, Set
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
 from functools import cached_property
 from typing import Any, NamedTuple
 
@@ -19,13 +19,16 @@ from velatura.model.solved import reciprocal_balance, sample_allocation
 from velatura.model.solved.bsdf import ROOTS, Shape, Side, Solved
 from velatura.model.solved.columns import Columns, Declaration
 from velatura.model.solved.energies.adding import Part, interfaces, parts
-from velatura.model.solved.energies.energies import INCIDENCES, SAMPLES, Energies, energies, media_of
-from velatura.model.solved.energies.media import Slab
+from velatura.model.solved.energies.energies import INCIDENCES, MODES, SAMPLES, Energies, energies, media_of
+from velatura.model.solved.energies.media import Slab, escaped
+from velatura.model.solved.energies.modes import Relative
+from velatura.model.solved.energies.nodes import Nodes
 from velatura.model.solved.grid import Folded, Grid, Listed
 from velatura.model.solved.guards import ALBEDO_MIN, COS_ON_GRID_MIN, ENERGY_EPS, WIDTH_ALPHA_MAX
-from velatura.model.solved.lobes import refracted_lobe, remainder, widths
+from velatura.model.solved.lobes import refracted_lobe, remainder, top_medium, widths
 from velatura.model.solved.lobes.refracted_lobe import MediumIndex
-from velatura.model.solved.lobes.remainder import Remainder
+from velatura.model.solved.lobes.remainder import Remainder, RemainderSamples
+from velatura.model.solved.lobes.top_medium import ORDERS, TopMedium, TopSamples
 from velatura.model.solved.lobes.widths import Tensor
 from velatura.model.solved.sample_allocation import Demand
 from velatura.model.solved.transmission import combined, direct, internal_reflections
@@ -50,7 +53,7 @@ MANY = 4  # interfaces, beyond which each meets fewer samples
 FINELY = 1597, 4181  # facets, and as NORMALS, for differences, whose error is that of values over a step
 BETWEEN = {True: 144, False: 89}  # as NORMALS, for each place of a renderer's grid
 NARROW = 0.05  # roughness of lobes whose integrals have edges between directions, as those of interfaces do
-EVENLY = 377  # directions over which the remainder is integrated
+EVENLY = 377  # directions over which the remainder is integrated, and four times as many with a medium on top
 BRIGHTEST = 4.0  # by how much it is scaled at most
 LITTLE = 0.05  # by which energies are scaled for their colour
 BRIGHTER = 1.5  # at most, where it takes light of lobes
@@ -72,26 +75,30 @@ class LobeSpec:
 @dataclass(frozen=True)
 class Layout:
     """The lobes of a side, the interfaces that make a step of the index, the last one whose facets turn light, the
-    slabs that scatter, by the number of interfaces above, and the indices of media that nodes are chosen for."""
+    slabs that scatter, by the number of interfaces above, and the indices of media that nodes are chosen for; the place
+    of a medium that scatters below no step of the index, None without one."""
 
     lobes: list[LobeSpec]
     stepped: list[int]
     rough: int | None
     cloudy: list[int]
     indices: list[float]
+    top: int | None
 
 
 @dataclass(frozen=True)
 class SolvedSide:
     """A side of a material in NumPy: columns (C, M) and (M,) over the directions of a grid; numbers of the remainder,
     (C,), and the albedo that it gains by being clipped at 0, (C, cosines); the shape of each lobe whose integral
-    has an edge between directions, else None; and what passes, in a material that is drawn forward, else None."""
+    has an edge between directions, else None; what passes, in a material that is drawn forward, else None; and where a
+    medium on top is apart, shares of its wider phase functions, (ORDERS, C), and chances, (3,)."""
 
     columns: Columns
     polynomial: Remainder
     clipped: Array
     edged: Sequence[Shape | None]
     transmission: Transmission | None = None
+    top: tuple[Array, Array] | None = None
 
     @cached_property
     def rows(self) -> Array:
@@ -104,8 +111,9 @@ class SolvedSide:
 
     @property
     def numbers(self) -> Array:
-        """Those of the remainder, (8 C,)."""
-        return np.concatenate(list(vars(self.polynomial).values()))
+        """Those of the remainder, (8 C,), and after them those of a medium on top."""
+        own = [] if self.top is None else [*self.top[0], self.top[1]]
+        return np.concatenate([*vars(self.polynomial).values(), *own])
 
     def weighed(self, factors: Sequence[Array], wanted: Demand) -> SolvedSide:
         """The side with weights of reflected parts, and of what passes, scaled by factors (C, M), and samples shared
@@ -165,7 +173,8 @@ class Solver:
 
     `shape` is that of the grid on which a renderer has the columns. `samples` are those of `reciprocal_balance`;
     `normals` are those of facets, and of lobes that are integrated, None for as many as usual, or as are asked for by
-    `finely`.
+    `finely`. A medium on top scatters `apart` from the remainder where materials have values of their own, none of a
+    table.
     """
 
     model: Model
@@ -177,6 +186,7 @@ class Solver:
     samples: int | None = None
     normals: int | None = None
     finely: bool = False
+    apart: bool = False
 
     @classmethod
     def of(cls, model: Model, variance: type[Variance], context: Context, material: Material | None = None) -> Solver:
@@ -240,7 +250,7 @@ class Solver:
 
     def body(self, material: Material, found: Sequence[SolvedSide], layouts: Sequence[Layout]) -> Solved:
         """The BSDF in NumPy."""
-        made = []
+        made: list[Side] = []
         for seen, side, layout in zip(sides(material), found, layouts):
             curves = directional_grid.curves(list(self.spread(side)), self.shape, None)
             made.append(self._in_numpy(seen, side, layout, curves))
@@ -248,16 +258,24 @@ class Solver:
 
     def _in_numpy(self, material: Material, found: SolvedSide, layout: Layout, curves: Any) -> Side:
         polynomial = Remainder(*(np.reshape(x, (-1, 1)) for x in vars(found.polynomial).values()))
-        return self.side(material, layout, curves, polynomial, Context(colour=_stacked, tables=self.tables))
+        top = found.top and TopMedium.of(material, layout.top, found.top[0][..., None], found.top[1])
+        return self.side(material, layout, curves, polynomial, Context(colour=_stacked, tables=self.tables), top)
 
-    def side(self, material: Material, layout: Layout, curves: Any, polynomial: Remainder, context: Context) -> Side:
+    def side(
+        self,
+        material: Material,
+        layout: Layout,
+        curves: Any,
+        polynomial: Remainder,
+        context: Context,
+        top: TopMedium | None = None,
+    ) -> Side:
         """A side of a material of a renderer's values, those of one point or of all."""
         assert context.colour is not None
-        shapes = shapes_of(smooth_interfaces(material), layout.lobes)
+        shapes = tuple(shapes_of(smooth_interfaces(material), layout.lobes))
+        samples = TopSamples(polynomial.samples, top) if top else polynomial.samples
         transmission = self.transmission(material, layout)
-        return Side(
-            curves, tuple(shapes), polynomial, polynomial.samples, transmission, context.colour, self.colours, self.kind
-        )
+        return Side(curves, shapes, polynomial, samples, transmission, context.colour, self.colours, self.kind, top)
 
     def transmission(self, material: Material, layout: Layout) -> Transmission | None:
         """What passes a material; None where nothing does."""
@@ -280,9 +298,9 @@ class Solver:
 
     def _side(self, material: Material, layout: Layout, folded: Folded | Listed) -> SolvedSide:
         """A side of a material at some directions, in the order of the physics."""
-        light, polynomial = self._light(material, layout, folded)
+        light, polynomial, top = self._light(material, layout, folded)
         lobes = self._lobes(material, layout, folded, light)
-        clipped, peak = _clipped(polynomial, folded.at_cosines)
+        clipped, peak = _clipped(polynomial, top, folded.at_cosines)
         whole = polynomial.albedo(folded.cosine) + folded.around(clipped)
         drawn, rest = self._hand_over(material, layout, folded, light, lobes, whole)
         scale = _scale(rest, whole)
@@ -303,10 +321,14 @@ class Solver:
         numbers = Remainder(*(np.broadcast_to(x[:, 0], self.colours) for x in vars(polynomial).values()))
         edged = self._edged(material, lobes, folded.phi)
         forward = transmission if self.model.form == "forward" else None
-        return SolvedSide(folded.unfolded(columns), numbers, self._colours(clipped), edged, forward)
+        fitted = (np.stack([self._colours(x)[:, 0] for x in top.shares]), np.array(top.chances)) if top else None
+        return SolvedSide(folded.unfolded(columns), numbers, self._colours(clipped), edged, forward, fitted)
 
-    def _light(self, material: Material, layout: Layout, folded: Folded | Listed) -> tuple[Energies, Remainder]:
-        """Solve for the energies of all parts, and fit the remainder's polynomial."""
+    def _light(
+        self, material: Material, layout: Layout, folded: Folded | Listed
+    ) -> tuple[Energies, Remainder, TopMedium | None]:
+        """Solve for the energies of all parts, and fit the remainder's polynomial beside what a medium on top scatters
+        back."""
         solved = energies(
             material,
             np.concatenate([folded.cosine, INCIDENCES]),
@@ -317,8 +339,20 @@ class Solver:
             like=layout.indices,
         )
         albedos = (solved.lobes.sum(axis=0) + solved.veils.sum(axis=0) + solved.rest)[:, folded.count :]
-        polynomial = remainder.fit(solved.nodes, solved.remainder, INCIDENCES, albedos)
-        return solved.first(folded.count), Remainder(*(x[:, None] for x in vars(polynomial).values()))
+        light, own, others = solved.remainder, None, []
+        if self.apart and layout.top is not None:
+            own, *others = _scattered_back(material, layout.top, solved.nodes)
+            light = light - own
+            others = [np.broadcast_to(each, light.shape) for each in others]
+        polynomial, shares = remainder.fit(solved.nodes, light, INCIDENCES, albedos, others)
+        top = None
+        if own is not None:
+            energy = own + sum(share[:, None, None, None] * each for share, each in zip(shares, others))
+            chances = top_medium.chances(INCIDENCES, energy[:, 0].sum(axis=1), solved.rest[:, folded.count :])
+            top = TopMedium.of(_uncoloured(material), layout.top, shares[..., None], chances)
+        elif self.apart and material.transmits:
+            top = TopMedium.of(material, None, np.zeros((len(ORDERS), 1, 1)), np.zeros(3))
+        return solved.first(folded.count), Remainder(*(x[:, None] for x in vars(polynomial).values())), top
 
     def _lobes(self, material: Material, layout: Layout, folded: Folded | Listed, light: Energies) -> list[_Lobe]:
         """Work out the widths of lobes and veils."""
@@ -488,8 +522,9 @@ def solve(material: Material, model: Model, variance: type[Variance], context: C
     """The BSDF of a material with constants of a renderer; differentiable."""
     material = material.solid()
     start, given = plain(material), Variables.of(material)
-    solver = Solver.of(model, variance, context, start)
+    solver = replace(Solver.of(model, variance, context, start), apart=True)
     layouts = solver.layouts([start])
+    solver = replace(solver, apart=any(layout.top is not None for layout in layouts))
 
     packings: list[Packing] = []
 
@@ -511,16 +546,36 @@ def solve(material: Material, model: Model, variance: type[Variance], context: C
         tables = [directional_grid.interleaved(next(flat), solver.shape, context.number) for _ in packing.tables]
         curves, column = packing.curves(tables), next(flat)
         numbers = column[:, None] if context.colour is channels else finite_differences.numbers(column, context.number)
-        made.append(solver.side(seen, layout, curves, remainder_of(numbers, solver, context), context))
+        top = top_of(seen, layout, numbers, solver, context) if solver.apart else None
+        made.append(solver.side(seen, layout, curves, remainder_of(numbers, solver, context), context, top))
     return solver.bsdf(material, made)
 
 
 def remainder_of(numbers: Sequence[Value], solver: Solver, context: Context) -> Remainder:
     """The remainder of a renderer's numbers."""
     assert context.colour is not None
-    width = solver.colours
-    each = [ops.channel(x, k % width) for k, x in enumerate(numbers)]
+    width, count = solver.colours, len(fields(Remainder))
+    each = [ops.channel(x, k % width) for k, x in enumerate(numbers[: count * width])]
     return Remainder(*(context.colour(*each[k : k + width]) for k in range(0, len(each), width)))
+
+
+def top_of(material: Material, layout: Layout, numbers: Sequence[Value], solver: Solver, context: Context) -> TopMedium:
+    """The medium on top of a material of a renderer's values, by the numbers that come after those of the remainder."""
+    assert context.colour is not None
+    width, begin = solver.colours, len(fields(Remainder)) * solver.colours
+    end = begin + len(ORDERS) * width
+    own = [ops.channel(x, k % width) for k, x in enumerate(numbers[begin:end])]
+    shares = [context.colour(*own[k : k + width]) for k in range(0, len(own), width)]
+    return TopMedium.of(material, layout.top, shares, [ops.channel(x, 0) for x in numbers[end:]])
+
+
+def _scattered_back(material: Material, place: int, nodes: Nodes) -> list[Array]:
+    """Light (C, modes, N, I) that a medium scatters back once by its phase function, and by wider ones without loss,
+    from `INCIDENCES`."""
+    top = TopMedium.of(_uncoloured(material), place, (), ())
+    depth, basis, p = np.ravel(top.depth), Relative(nodes, MODES), np.sqrt(1 - INCIDENCES**2)
+    own, *others = (escaped(phase, depth, basis, p) for phase in (top.phase, *top.wider))
+    return [np.reshape(top.albedo, (-1, 1, 1, 1)) * own, *others]
 
 
 def _stacked(*channels: Array) -> Array:
@@ -538,7 +593,19 @@ def layout_of(materials: Sequence[Material], veiled: Set[int] = frozenset()) -> 
     denser = np.all(above >= 1, axis=0).tolist()
     lobes = [LobeSpec(k, widths.first_step(steps[:k]), veil, denser[k]) for k, veil in both]
     cloudy = sorted(set().union(*map(_cloudy, materials)))
-    return Layout(lobes, widths.stepped(steps), rough[-1] if rough else None, cloudy, media_of(materials[0]))
+    stepped = widths.stepped(steps)
+    last = rough[-1] if rough else None
+    return Layout(lobes, stepped, last, cloudy, media_of(materials[0]), _top(materials[0], stepped))
+
+
+def _top(material: Material, stepped: Sequence[int]) -> int | None:
+    """Place of a medium that scatters light and has no step of the index above it; None without one."""
+    for place, layer in enumerate(material.layers):
+        if isinstance(layer, SlabValues):
+            return place if np.any(layer.tau_s > 0) else None
+        if not isinstance(layer, InterfaceValues) or layer.kind != "dielectric" or layer.films or place in stepped:
+            return None
+    return None
 
 
 def _cloudy(material: Material) -> set[int]:
@@ -577,15 +644,25 @@ def _uncoloured(material: Material) -> Material:
     return material.each(lambda _, value: channels(value) if np.ndim(value) else value)
 
 
-def _clipped(polynomial: Remainder, wi: Direction) -> tuple[Array, Array]:
-    """Albedo that a remainder of numbers (C, 1) gains by being clipped, and the largest weight of its samples,
-    (C, M)."""
+def _clipped(polynomial: Remainder, top: TopMedium | None, wi: Direction) -> tuple[Array, Array]:
+    """Albedo that a remainder of numbers (C, 1) gains by a medium on top, and by being clipped, and the largest weight
+    of its samples, (C, M)."""
     numbers = Remainder(*(x[..., None] for x in vars(polynomial).values()))
     x, y, z = (each[:, None] for each in wi)
-    wo = numbers.sample((x, y, z), *low_discrepancy.at_nodes(1, EVENLY, None))
-    density = numbers.density((x, y, z), wo)
-    value, unclipped = numbers.value((x, y, z), wo) / density, numbers.unclipped((x, y, z), wo)[1] * wo[2]
-    return (value - unclipped / (np.pi * density)).mean(axis=-1), value.max(axis=-1)
+    samples: RemainderSamples | TopSamples = numbers.samples
+    if top:
+        top = replace(top, **{k: _wider(getattr(top, k)) for k in ("albedo", "depth", "shares")})
+        samples = TopSamples(numbers.samples, top)
+    wo = samples.sample((x, y, z), *low_discrepancy.at_nodes(1, 4 * EVENLY if top else EVENLY, None))
+    density = samples.density((x, y, z), wo)
+    light = top_medium.value(numbers, top, (x, y, z), wo) if top else numbers.value((x, y, z), wo)
+    value, unclipped = ops.divide(light, density), numbers.unclipped((x, y, z), wo)[1] * wo[2]
+    return (value - ops.divide(unclipped / np.pi, density)).mean(axis=-1), value.max(axis=-1)
+
+
+def _wider(values: Any) -> Any:
+    """Arrays with one axis more."""
+    return values[..., None] if isinstance(values, np.ndarray) else values
 
 
 def _passing(transmission: Transmission, solved: Energies, cosines: Array) -> Array:

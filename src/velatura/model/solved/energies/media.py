@@ -14,9 +14,12 @@ from velatura import ops
 from velatura.media.of_material import phase_of
 from velatura.model.rough_interface import Light, colours
 from velatura.model.solved.energies.interfaces import Setting, scaled
+from velatura.model.solved.energies.modes import Basis
 from velatura.model.solved.energies.operators import Layer, Operator
-from velatura.model.solved.guards import COS_IN_MEDIA_MIN, G_MAX, SIN_IN_MEDIA_MAX, TINY
+from velatura.model.solved.guards import BELOW_ONE, COS_IN_MEDIA_MIN, G_MAX, SIN_IN_MEDIA_MAX, TINY
+from velatura.model.solved.lobes import top_medium
 from velatura.ops import Value
+from velatura.optics.ggx import Direction
 from velatura.optics.phase import HenyeyGreenstein, PhaseFunction, deflect
 from velatura.renderer.low_discrepancy import fibonacci
 from velatura.stack import SlabValues
@@ -26,7 +29,8 @@ Array = NDArray[np.floating]
 Straight = Callable[[PhaseFunction], float]  # share of scattered light that counts as going straight on
 
 THIN = 1e-4  # depth of the first layer, which scatters once at most: errors go as this depth
-EVENTS = 600
+EVENTS = 1000
+EVEN = 0.25  # of the events, in all directions alike, where few are drawn by a phase function with a peak
 
 
 @dataclass(frozen=True)
@@ -100,18 +104,47 @@ def _kept(slab: Slab, depth: Array, p: Array) -> Array:
 def _scattered(slab: Slab, p: Array, psi: Array, setting: Setting) -> tuple[Array, ...]:
     """Light that is scattered up, and down, of light of one unit that travels down, (1, modes, N, S); kept for other
     media."""
+    key = _scattered, slab.n, slab.phase.key, p.tobytes(), psi.tobytes(), setting.basis.nodes.ends
+    lattice = _lattice(slab.phase)
+    return tuple(setting.kept(key, lambda: setting.basis.deposited(_events, p, psi, lattice, [slab.n])[0]))
+
+
+def _lattice(phase: PhaseFunction) -> tuple[Array, Array, Array]:
+    """Cosines and azimuths, in turns, of events of a phase function, and the share of light of each."""
     u_1, u_2 = fibonacci(EVENTS)
-    numbers = slab.n, 1 / len(u_1)
-    key = _scattered, *numbers, slab.phase.key, p.tobytes(), psi.tobytes(), setting.basis.nodes.ends
-    lattice = slab.phase.sample(u_1), u_2
-    return tuple(setting.kept(key, lambda: setting.basis.deposited(_events, p, psi, lattice, numbers)[0]))
+    drawn = u_1 < 1 - EVEN
+    cosine = np.where(drawn, phase.sample(np.minimum(u_1 / (1 - EVEN), BELOW_ONE)), 2 * (u_1 - 1 + EVEN) / EVEN - 1)
+    density = phase.density(cosine)
+    share = density / ((1 - EVEN) * density + EVEN / (4 * pi))
+    return cosine, u_2, share / share.sum()
 
 
 def _events(
     sources: Sequence[Value], samples: Sequence[Value], numbers: Sequence[Value]
 ) -> tuple[list[Light], list[Value]]:
-    (p, psi), (cosine, u_2), (n, share) = sources, samples, numbers
+    (p, psi), (cosine, u_2, share), (n,) = sources, samples, numbers
+    x, y, z = _deflected(p, psi, cosine, u_2, n)
+    return [Light(n * x, n * y, [ops.select(there, share, 0.0)]) for there in (z <= 0, z > 0)], []
+
+
+def _deflected(p: Value, psi: Value, cosine: Value, u_2: Value, n: Value) -> Direction:
+    """Direction of travel, downwards, of light of momentum p at an azimuth, after an event in a medium of index n."""
     sin = ops.minimum(p / n, SIN_IN_MEDIA_MAX)
     w = sin * ops.cos(psi), sin * ops.sin(psi), ops.sqrt(1 - sin * sin)
-    x, y, z = deflect(w, cosine, 2 * pi * u_2)
-    return [Light(n * x, n * y, [ops.select(there, share, 0.0)]) for there in (z <= 0, z > 0)], []
+    return deflect(w, cosine, 2 * pi * u_2)
+
+
+def escaped(phase: PhaseFunction, depth: Array, basis: Basis, p: Array) -> Array:
+    """Light (C, modes, N, S) that a medium of an optical depth (C,) scatters back once by a phase function, without
+    loss in an event, of one unit from outside of momenta p (S,)."""
+    numbers = [*depth.tolist()]
+    return basis.deposited(_escapes, p, np.zeros_like(p), _lattice(phase), numbers)[0][0]
+
+
+def _escapes(
+    sources: Sequence[Value], samples: Sequence[Value], depths: Sequence[Value]
+) -> tuple[list[Light], list[Value]]:
+    (p, psi), (cosine, u_2, share) = sources, samples
+    x, y, z = _deflected(p, psi, cosine, u_2, 1.0)
+    up, z_i = ops.maximum(-1 * z, 0.0), ops.sqrt(1 - p * p)
+    return [Light(x, y, [share * up * top_medium.escaping(depth, z_i, up) for depth in depths])], []

@@ -18,6 +18,7 @@ from math import pi
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.linalg import block_diag
 
 from velatura import ops
 from velatura.model.solved.energies.nodes import QUADRATURE, Nodes
@@ -144,14 +145,18 @@ def _tilted(tilt: Value, wi: Direction, wo: Direction) -> Value:
     return ops.clip(-1 * tilt * (wi[0] * wo[0] + wi[1] * wo[1]), -TILT, TILT)
 
 
-def fit(nodes: Nodes, measures: Array, cosines: Array, albedos: Array) -> Remainder:
-    """The polynomial closest to the light that leaves a stack, by colour (C,).
+def fit(
+    nodes: Nodes, measures: Array, cosines: Array, albedos: Array, others: Sequence[Array] = ()
+) -> tuple[Remainder, Array]:
+    """The polynomial closest to the light that leaves a stack, by colour (C,), and the shares of other functions beside
+    it, (others, C), which are not negative.
 
     Args:
         measures: (C, modes, N, M) of light from M directions: its energy at the nodes, and its means of cos(phi) and
             cos(2 phi), as far as it has any; phi is 0 on the side of the mirror direction.
         cosines: of the directions, (M,).
         albedos: of the stack for these, (C, M); errors count relative to them.
+        others: likewise measures of these functions, (C, modes, N, M).
     """
     outside, even, deposits, once, twice = _of_nodes(nodes, 1.0)
     sine = np.sqrt(1 - cosines * cosines)[:, None]
@@ -162,7 +167,7 @@ def fit(nodes: Nodes, measures: Array, cosines: Array, albedos: Array) -> Remain
     of_once, of_twice = [0.5 * sine * once], [0.5 * sine * sine * twice]
 
     numbers = []
-    for light, albedo in zip(measures, albedos):
+    for c, (light, albedo) in enumerate(zip(measures, albedos)):
         weight = even / np.maximum(albedo, ALBEDO_MIN)[:, None]
         exact = EXACT / np.maximum(albedo, ALBEDO_MIN)
         seen = light[:, outside].swapaxes(-1, -2)
@@ -171,8 +176,34 @@ def fit(nodes: Nodes, measures: Array, cosines: Array, albedos: Array) -> Remain
         parts = [(rows, target)]
         parts += [(_rows(each, weight), (weight * mode).ravel()) for each, mode in zip((of_once, of_twice), seen[1:])]
         parts += [(np.eye(1), np.zeros(1))] * (3 - len(parts))
-        numbers.append(np.concatenate([np.linalg.lstsq(*part, rcond=None)[0] for part in parts]))
-    return Remainder(*np.stack(numbers, axis=-1))
+        columns = []
+        for each in others:
+            at_nodes = each[c][:, outside].swapaxes(-1, -2)
+            mean_of, *waves = ((weight * mode).ravel() for mode in at_nodes)
+            columns.append([np.concatenate([mean_of, exact * each[c][0].sum(axis=0)]), *waves])
+        numbers.append(_solved(parts, columns))
+    found = np.stack(numbers, axis=-1)
+    count = len(fields(Remainder))
+    return Remainder(*found[:count]), found[count:]
+
+
+def _solved(parts: Sequence[tuple[Array, Array]], columns: Sequence[Sequence[Array]]) -> Array:
+    """Least squares of parts, each of numbers of its own, and of columns that all parts share, whose numbers are not
+    negative: those that would be are left out."""
+    kept = list(range(len(columns)))
+    while kept:
+        rows = block_diag(*(rows for rows, _ in parts))
+        shared = np.stack([np.concatenate(columns[k]) for k in kept], axis=-1)
+        target = np.concatenate([target for _, target in parts])
+        found = np.linalg.lstsq(np.concatenate([rows, shared], axis=-1), target, rcond=None)[0]
+        shares = found[-len(kept) :]
+        if shares.min() >= 0:
+            others = np.zeros(len(columns))
+            others[kept] = shares
+            return np.concatenate([found[: -len(kept)], others])
+        kept.pop(int(np.argmin(shares)))
+    alone = [np.linalg.lstsq(*part, rcond=None)[0] for part in parts]
+    return np.concatenate([*alone, np.zeros(len(columns))])
 
 
 def passing(nodes: Nodes, measures: Array, n: float, sines: Array) -> Array:

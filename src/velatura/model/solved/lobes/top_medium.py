@@ -1,0 +1,134 @@
+"""Light that a medium scatters back where nothing above it refracts much: fog, dust, matt paint.
+
+Of a homogeneous medium of optical depth tau and albedo a, with cosines z_i and z_o and the angle Theta between the
+directions of travel, light that is scattered once is reflected as (Chandrasekhar 1960, section 47)
+
+    f = a p(cos Theta) (1 - exp(-tau (1 / z_i + 1 / z_o))) / (z_i + z_o).
+
+Light that is scattered a few times keeps much of that form, by phase functions that are wider: the n-th of Henyey and
+Greenstein's with itself has the asymmetry g^n. So there are two more terms, of g^2 and g^4, whose shares are fitted to
+the nodes, and the remainder is what is left of that. All of it is reciprocal.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from math import pi
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from velatura import ops
+from velatura.media.of_material import phase_of
+from velatura.model.solved.guards import COS_OF_DIRECTIONS_MIN
+from velatura.model.solved.lobes.remainder import Remainder, RemainderSamples, grazing
+from velatura.ops import Value
+from velatura.optics import ggx
+from velatura.optics.ggx import Direction
+from velatura.optics.phase import HenyeyGreenstein, PhaseFunction, deflect
+from velatura.stack import Material, SlabValues
+
+Array = NDArray[np.floating]
+
+ORDERS = 2, 4  # powers of the asymmetry
+MOST = 0.8  # of the samples of the remainder that are drawn by the phase function
+
+
+@dataclass(frozen=True)
+class TopMedium(ops.NamedFields):
+    """A medium by its albedo and optical depth, colours, its phase function and wider ones, with their shares, colours.
+
+    Samples are shared by `chances`, coefficients of 1, z and (1 - z)^4 for the cosine of the light.
+    """
+
+    albedo: Value
+    depth: Value
+    phase: PhaseFunction
+    wider: Sequence[PhaseFunction]
+    shares: Sequence[Value]
+    chances: Sequence[Value]
+
+    @classmethod
+    def of(cls, material: Material, place: int | None, shares: Any, chances: Any) -> TopMedium:
+        """The medium in a place of a material, in any dialect; where there is none, one that scatters nothing."""
+        if place is None:
+            nothing = HenyeyGreenstein(0.0)
+            return cls(0.0, 1.0, nothing, [nothing] * len(ORDERS), shares, chances)
+        layer = material.layers[place]
+        assert isinstance(layer, SlabValues)
+        depth = layer.tau_a + layer.tau_s
+        wider = [HenyeyGreenstein(power(layer.g, n)) for n in ORDERS]
+        return cls(ops.divide(layer.tau_s, depth), depth, phase_of(layer), wider, shares, chances)
+
+    def value(self, wi: Direction, wo: Direction) -> Value:
+        """f(wi, wo), a colour, of directions above."""
+        cosine = -1 * ggx.dot(wi, wo)
+        scattered = self.albedo * self.phase.density(cosine)
+        for share, phase in zip(self.shares, self.wider):
+            scattered = scattered + share * phase.density(cosine)
+        return scattered * escaping(self.depth, wi[2], wo[2])
+
+    def chance(self, wi: Direction) -> Value:
+        """Share of samples that are drawn by the phase function."""
+        even, along, slanted = self.chances
+        return ops.clip(even + along * wi[2] + slanted * grazing(wi[2]), 0.0, MOST)
+
+    @property
+    def drawn(self) -> PhaseFunction:
+        """The phase function of samples."""
+        return self.wider[0]
+
+
+@dataclass(frozen=True)
+class TopSamples(ops.NamedFields):
+    """Samples of a remainder and of what the medium on top scatters back; what goes down is thrown back up."""
+
+    rest: RemainderSamples
+    top: TopMedium
+
+    def density(self, wi: Direction, wo: Direction) -> Value:
+        """Density of `sample`, of directions above."""
+        x, y, z = wo
+        chance, phase = self.top.chance(wi), self.top.drawn
+        both = sum(phase.density(-1 * ggx.dot(wi, w)) for w in ((x, y, z), (x, y, -1 * z)))
+        return (1 - chance) * self.rest.density(wi, wo) + ops.select(z > 0, chance * both, 0.0)
+
+    def sample(self, wi: Direction, u: Value, u1: Value, u2: Value) -> Direction:
+        """A direction wo from uniform numbers."""
+        chance = self.top.chance(wi)
+        by_phase = u < chance
+        x, y, z = self.rest.sample(wi, ops.clip(ops.divide(u - chance, 1 - chance), 0.0, 1.0), u1, u2)
+        w = deflect((-1 * wi[0], -1 * wi[1], -1 * wi[2]), self.top.drawn.sample(u1), 2 * pi * u2)
+        drawn = zip((w[0], w[1], ops.absolute(w[2])), (x, y, z))
+        x, y, z = (ops.select(by_phase, a, b) for a, b in drawn)
+        return x, y, z
+
+
+def power(g: Value, n: int) -> Value:
+    """A whole power of a number of any sign."""
+    found = g
+    for _ in range(n - 1):
+        found = found * g
+    return found
+
+
+def escaping(depth: Value, z_i: Value, z_o: Value) -> Value:
+    """Light that passes a medium to a place and back, (1 - exp(-tau (1 / z_i + 1 / z_o))) / (z_i + z_o)."""
+    z_i, z_o = (ops.maximum(z, COS_OF_DIRECTIONS_MIN) for z in (z_i, z_o))
+    return (1 - ops.exp(-depth * (1 / z_i + 1 / z_o))) / (z_i + z_o)
+
+
+def value(rest: Remainder, top: TopMedium, wi: Direction, wo: Direction) -> Value:
+    """f(wi, wo) |cos theta_o| of a remainder and of what the medium on top scatters back, a colour; 0 unless both are
+    above the surface."""
+    z = ops.select(wi[2] > 0, ops.maximum(wo[2], 0.0), 0.0)
+    return ops.maximum(top.value(wi, wo) + rest.unclipped(wi, wo)[1] * (1 / pi), 0.0) * z
+
+
+def chances(cosines: Array, energy: Array, whole: Array) -> Array:
+    """Coefficients (3,) of `TopMedium.chance`, by energies (C, N) at some cosines, its own and all of the remainder."""
+    basis: Any = np.stack([np.ones_like(cosines), cosines, grazing(cosines)], axis=-1)
+    share = np.mean(energy, axis=0) / np.maximum(np.mean(whole, axis=0), ops.TINY)
+    return np.asarray(np.linalg.lstsq(basis, np.clip(share, 0, MOST), rcond=None)[0])
