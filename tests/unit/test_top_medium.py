@@ -61,6 +61,18 @@ def test_samples_have_the_values_over_their_density(below: list[Any], form: str)
         assert weights.max() < 2.9
 
 
+def test_light_that_is_thrown_straight_back_is_kept() -> None:
+    """Expected: a peak backwards, of g -.9, is sampled: no weight is cut, and energies are near to .01 of the light."""
+    found = body([Medium(sigma_s=1.0, g=-0.9), Diffuse(albedo=0.3)])
+    u = np.random.default_rng(7).random((3, 20_000))
+    for cosine in (0.9, 0.2):
+        wi = directions(cosine, np.zeros(u.shape[1]))
+        wo, _ = found.sample(wi, *u)
+        value, density = found.eval_pdf(wi, wo)
+        weights = np.where(density > 0, value / np.maximum(density, 1e-12), 0.0)
+        assert np.all(np.abs(weights.mean(axis=1) - np.ravel(found.albedo(wi))[0]) < 0.01)
+
+
 def test_densities_of_reflected_samples_sum_to_one() -> None:
     found = body([Medium(sigma_s=0.9, sigma_a=0.1, g=0.7), Diffuse(albedo=0.4)])
     z, phi = (np.arange(400) + 0.5) / 400, (np.arange(200) + 0.5) * (2 * pi / 200)

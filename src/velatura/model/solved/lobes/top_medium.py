@@ -33,7 +33,7 @@ from velatura.stack import Material, SlabValues
 Array = NDArray[np.floating]
 
 ORDERS = 2, 4  # powers of the asymmetry
-MOST = 0.8  # of the samples of the remainder that are drawn by the phase function
+MOST = 0.8  # of the samples of the remainder that are drawn by phase functions
 
 
 @dataclass(frozen=True)
@@ -71,36 +71,39 @@ class TopMedium(ops.NamedFields):
         return scattered * escaping(self.depth, wi[2], wo[2])
 
     def chance(self, wi: Direction) -> Value:
-        """Share of samples that are drawn by the phase function."""
+        """Share of samples that are drawn by phase functions."""
         even, along, slanted = self.chances
         return ops.clip(even + along * wi[2] + slanted * grazing(wi[2]), 0.0, MOST)
-
-    @property
-    def drawn(self) -> PhaseFunction:
-        """The phase function of samples."""
-        return self.wider[0]
 
 
 @dataclass(frozen=True)
 class TopSamples(ops.NamedFields):
-    """Samples of a remainder and of what the medium on top scatters back; what goes down is thrown back up."""
+    """Samples of a remainder and of what the medium on top scatters back, half of these by its own phase function and
+    half by a wider one; what goes down is thrown back up."""
 
     rest: RemainderSamples
     top: TopMedium
 
+    @property
+    def drawn(self) -> tuple[PhaseFunction, PhaseFunction]:
+        return self.top.phase, self.top.wider[0]
+
     def density(self, wi: Direction, wo: Direction) -> Value:
         """Density of `sample`, of directions above."""
         x, y, z = wo
-        chance, phase = self.top.chance(wi), self.top.drawn
-        both = sum(phase.density(-1 * ggx.dot(wi, w)) for w in ((x, y, z), (x, y, -1 * z)))
-        return (1 - chance) * self.rest.density(wi, wo) + ops.select(z > 0, chance * both, 0.0)
+        chance = self.top.chance(wi)
+        cosines = [-1 * ggx.dot(wi, w) for w in ((x, y, z), (x, y, -1 * z))]
+        own, wider = (sum(map(phase.density, cosines)) for phase in self.drawn)
+        return (1 - chance) * self.rest.density(wi, wo) + ops.select(z > 0, 0.5 * chance * (own + wider), 0.0)
 
     def sample(self, wi: Direction, u: Value, u1: Value, u2: Value) -> Direction:
         """A direction wo from uniform numbers."""
         chance = self.top.chance(wi)
         by_phase = u < chance
         x, y, z = self.rest.sample(wi, ops.clip(ops.divide(u - chance, 1 - chance), 0.0, 1.0), u1, u2)
-        w = deflect((-1 * wi[0], -1 * wi[1], -1 * wi[2]), self.top.drawn.sample(u1), 2 * pi * u2)
+        own, wider = (phase.sample(u1) for phase in self.drawn)
+        cosine = ops.select(u < 0.5 * chance, own, wider)
+        w = deflect((-1 * wi[0], -1 * wi[1], -1 * wi[2]), cosine, 2 * pi * u2)
         drawn = zip((w[0], w[1], ops.absolute(w[2])), (x, y, z))
         x, y, z = (ops.select(by_phase, a, b) for a, b in drawn)
         return x, y, z
