@@ -6,7 +6,9 @@
 `{{belcour2018-13: rmse/forward}}` becomes a number of `docs/figures/belcour2018-13.json`, which `make figures`
 computes. After the figure's name stand the keys that lead to the number; an item of a list has an index or its name. A
 number with a standard error (`x` beside `x_error`) is printed with it, others to three places, or to as many as ` to 2`
-asks for.
+asks for; text stands as it is. Numbers of a page's own lie beside it, as `docs/explanation/validation.json`.
+
+`<!-- table validation: media/truths -->` becomes a table of such a list, a row for each item, with two digits.
 
 A link to a script in `docs/examples` becomes one to its page in the gallery, where it stands with its picture.
 
@@ -30,7 +32,7 @@ from typing import Any
 ROOT = Path(__file__).parents[1]
 PACKAGE = ROOT / "src" / "velatura"
 DOCS = ROOT / "docs"
-FIGURES = DOCS / "figures"
+NUMBERS = (DOCS / "figures", DOCS / "explanation")  # folders
 PLACES = 3  # after the point
 
 EXAMPLES = (
@@ -139,6 +141,7 @@ def replaced(markdown: str) -> str:
     """A page with its placeholders replaced."""
     markdown = re.sub(r"<!-- parameters -->", lambda _: _parameters(), markdown)
     markdown = re.sub(r"<!-- presets -->", lambda _: _presets(), markdown)
+    markdown = re.sub(r"<!-- table (.*?): (.*?) -->", lambda match: _table(*match.groups()), markdown)
     markdown = re.sub(r"\{\{(.*?)\}\}", lambda match: _number(match[1]), markdown)
     markdown = re.sub(r"\]\(((?:\.\./)*)examples/(\w+)\.py\)", r"](\1gallery/\2.rst)", markdown)
     return re.sub(r"<!-- help((?: \w+)*) -->", lambda match: _help(match[1].split()), markdown)
@@ -212,7 +215,20 @@ def _number(placeholder: str) -> str:
 
 @cache
 def _figure(name: str) -> Any:
-    return json.loads((FIGURES / f"{name}.json").read_text())
+    paths = [folder / f"{name}.json" for folder in NUMBERS]
+    return json.loads(next((path for path in paths if path.is_file()), paths[0]).read_text())
+
+
+def _table(name: str, path: str) -> str:
+    """A table of a list of items, headed by their keys."""
+    items, _ = _found(name, path.split("/"))
+    titles = ["" if key == "name" else key.replace("_", " ") for key in items[0]]
+    rows = [[_cell(value) for value in item.values()] for item in items]
+    return "\n".join(f"| {' | '.join(cells)} |" for cells in (titles, ["---"] * len(titles), *rows))
+
+
+def _cell(value: Any) -> str:
+    return re.sub(r"^0\.", ".", f"{value:.2g}") if isinstance(value, float) else str(value)
 
 
 def _found(name: str, path: list[str]) -> tuple[Any, Any]:
@@ -234,6 +250,8 @@ def _item(found: Any, key: str) -> Any:
 
 
 def _written(value: Any, places: int) -> str:
+    if isinstance(value, str):
+        return value
     if isinstance(value, list):
         return ", ".join(_written(item, places) for item in value)
     return re.sub(r"^(-?)0\.", r"\1.", f"{round(value, places) + 0.0:.{places}f}")  # no -.000

@@ -30,7 +30,7 @@ def example(hooks: ModuleType, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) 
     cell["rmse_error"] = {"forward": 0.00169, "fine": 0.00086}
     numbers = {"cells": [cell], "angles": [1.0, 0.25], "energy": {"red": -0.1234}}
     (tmp_path / "some-figure.json").write_text(json.dumps(numbers))
-    monkeypatch.setattr(hooks, "FIGURES", tmp_path)
+    monkeypatch.setattr(hooks, "NUMBERS", (tmp_path,))
     return hooks
 
 
@@ -74,9 +74,18 @@ def test_generated_pages_of_names_that_are_gone_are_removed(
     assert [page.stem for page in pages.iterdir()] == ["velatura.lobes"]
 
 
-def test_every_placeholder_of_the_page_of_figures_resolves(hooks: ModuleType) -> None:
-    page = (ROOT / "docs" / "reference" / "figures.md").read_text()
-    assert "{{" not in hooks.replaced(page)
+@pytest.mark.parametrize(
+    "page", sorted(p for p in (ROOT / "docs").rglob("*.md") if "{{" in p.read_text()), ids=lambda p: p.stem
+)
+def test_every_placeholder_of_a_page_resolves(hooks: ModuleType, page: Path) -> None:
+    assert not re.search(r"\{\{|<!-- table", hooks.replaced(page.read_text()))
+
+
+def test_a_list_of_numbers_becomes_a_table(example: ModuleType, tmp_path: Path) -> None:
+    rows = [{"name": "a", "numbers": 3, "worst_case": 0.00123}, {"name": "b", "numbers": 4, "worst_case": 1e-7}]
+    (tmp_path / "other.json").write_text(json.dumps({"rows": rows}))
+    printed = "|  | numbers | worst case |\n| --- | --- | --- |\n| a | 3 | .0012 |\n| b | 4 | 1e-07 |"
+    assert example.replaced("<!-- table other: rows -->") == printed
 
 
 def test_the_page_shows_every_figure_beside_its_numbers() -> None:

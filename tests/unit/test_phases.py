@@ -1,6 +1,6 @@
 """Phase functions of media: as written, as distributions, in stacks by the walk and by energies; media in a row.
 
-Energies against outside solvers are in test_radiative_transfer.py. Comparisons with walks are at 4.5 standard errors
+Energies against outside solvers are in test_validation.py. Comparisons with walks are at 4.5 standard errors
 beyond the error that is allowed (a false alarm in 150 000 each, about 20 of them); seeds are fixed.
 """
 

@@ -573,7 +573,7 @@ def _scattered_back(material: Material, place: int, nodes: Nodes) -> list[Array]
     """Light (C, modes, N, I) that a medium scatters back once by its phase function, and by wider ones without loss,
     from `INCIDENCES`."""
     top = TopMedium.of(_uncoloured(material), place, (), ())
-    depth, basis, p = np.ravel(top.depth), Relative(nodes, MODES), np.sqrt(1 - INCIDENCES**2)
+    depth, basis, p = np.ravel(top.depth), Relative(nodes, tuple(range(MODES))), np.sqrt(1 - INCIDENCES**2)
     own, *others = (escaped(phase, depth, basis, p) for phase in (top.phase, *top.wider))
     return [np.reshape(top.albedo, (-1, 1, 1, 1)) * own, *others]
 
