@@ -13,7 +13,6 @@ import numpy as np
 import pytest
 
 from velatura import benchmark
-from velatura.benchmark import stacks
 from velatura.stack import DiffuseValues, InterfaceValues, Material
 
 PAGE = Path(__file__).parents[2] / "docs" / "how-to" / "benchmark.md"
@@ -33,7 +32,7 @@ def test_a_function_is_scored(tmp_path: Path, capsys: pytest.CaptureFixture[str]
     assert summary["records"] == summary["asked"] == 40
     painted = [case for case in benchmark.edition() if case.kind == "diffuse base"]
     albedos = {case.id: case.stack.base.albedo for case in painted if case.stack.base}
-    with (stacks.DATA / "energies.csv").open() as stream:
+    with (benchmark.EDITIONS[1].data / "energies.csv").open() as stream:
         rows = [row for row in csv.DictReader(stream) if row["stack"] in albedos]
     energy = np.array([[float(row[f"energy_{c}"]) for c in "rgb"] for row in rows])
     errors = np.array([np.broadcast_to(albedos[row["stack"]], 3) for row in rows]) / energy - 1

@@ -226,8 +226,8 @@ def cheap(monkeypatch: pytest.MonkeyPatch) -> None:
         with ThreadPoolExecutor(1) as executor:
             return all_of(plan.model_copy(update={"count": 4}), store, executor)
 
-    one = stacks.chosen(["diffuse base"])[:1]
-    monkeypatch.setattr(scores, "chosen", lambda kinds: one)
+    one = {1: stacks.chosen(["diffuse base"], 1)[:1], 2: stacks.chosen(["wet asphalt"], 2)[:1]}
+    monkeypatch.setattr(scores, "chosen", lambda kinds, number: one[number])
     real, all_of = figures.figure, sweeping.carry_out
     monkeypatch.setattr(figures, "figure", figure)
     monkeypatch.setattr(sweeping, "carry_out", sweep)

@@ -8,16 +8,16 @@ from velatura.benchmark.candidates import Candidate, Factory, Walk, from_values,
 from velatura.benchmark.entrants import ENTRANTS, entrant
 from velatura.benchmark.figure import save_figure
 from velatura.benchmark.scores import Record, Scores, kept_score, score
-from velatura.benchmark.stacks import FORMAT, KINDS, Case, edition
+from velatura.benchmark.stacks import EDITIONS, Case, Edition, edition
 from velatura.benchmark.task import write_task
 from velatura.benchmark.walks import Light, truth, walk_all
 
 __all__ = [
+    "EDITIONS",
     "ENTRANTS",
-    "FORMAT",
-    "KINDS",
     "Candidate",
     "Case",
+    "Edition",
     "Factory",
     "Light",
     "Record",

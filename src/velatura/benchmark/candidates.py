@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from scipy.stats import qmc
 
 from velatura import files, kernel
-from velatura.benchmark.stacks import Case
+from velatura.benchmark.stacks import EDITIONS, Case
 from velatura.benchmark.walks import Binned, walked
 from velatura.checks.probe import Probe
 from velatura.errors import InvalidInput, VelaturaError
@@ -49,34 +49,38 @@ Factory: TypeAlias = Callable[[Case], Candidate]
 class Pairs:
     """All pairs of directions (n, 3) of a case, and their solid angles (n,); those of `keys` in turn, in equal parts.
 
-    keys: direction and side.
+    keys: direction and side; within: nodes (RADIAL * AZIMUTHAL,) of each bin of a key.
     """
 
     wi: Array
     wo: Array
     weight: Array
     keys: tuple[tuple[int, str], ...]
+    within: NDArray[np.intp]
 
     @classmethod
     def of(cls, case: Case, nodes: int = NODES) -> Pairs:
-        """The pairs of so many squared nodes for each bin."""
+        """The pairs of so many squared nodes for each bin, and of those of its edition in the first row."""
+        central = EDITIONS[case.edition].central
         sides = SIDES[: 1 + case.stack.transmits]
         keys = tuple((direction, side) for direction in range(len(case.incident)) for side in sides)
-        each = [Bins.of(case.incident[direction], side, case.eta).nodes(nodes) for direction, side in keys]
+        each = [Bins.of(case.incident[direction], side, case.eta).nodes(nodes, central) for direction, side in keys]
         wi = np.repeat(case.incident[[direction for direction, _ in keys]], len(each[0][1]), axis=0)
         wo, weight = (np.concatenate([pair[i] for pair in each], axis=-1) for i in (0, 1))
-        return cls(wi, wo.T, weight, keys)
+        within = np.full((RADIAL, AZIMUTHAL), nodes * nodes)
+        within[0] = nodes * (central or nodes)
+        return cls(wi, wo.T, weight, keys, within.ravel())
 
     def light(self, value: Array) -> dict[tuple[int, str], Binned]:
         """The light of values (n, 3), of those keys that have no NaN."""
         each = np.split(value * self.weight[:, None], len(self.keys))
-        return {key: _exact(light) for key, light in zip(self.keys, each) if np.isfinite(light).all()}
+        return {key: self._exact(light) for key, light in zip(self.keys, each) if np.isfinite(light).all()}
 
-
-def _exact(light: Array) -> Binned:
-    """Light of energies (n, 3) at nodes that stand bin by bin, without errors."""
-    energy = light.reshape(RADIAL, AZIMUTHAL, -1, 3).sum(axis=2)
-    return Binned(energy, np.zeros_like(energy), energy.sum(axis=(0, 1)), np.zeros(3))
+    def _exact(self, light: Array) -> Binned:
+        """Light of energies (n, 3) at the nodes of a key, without errors."""
+        begins = np.cumsum(self.within) - self.within
+        energy = np.add.reduceat(light, begins, axis=0).reshape(RADIAL, AZIMUTHAL, 3)
+        return Binned(energy, np.zeros_like(energy), energy.sum(axis=(0, 1)), np.zeros(3))
 
 
 def seen(case: Case, candidate: Candidate, nodes: int = NODES) -> dict[tuple[int, str], Binned]:

@@ -9,7 +9,7 @@ import numpy as np
 
 from velatura import files
 from velatura.benchmark.scores import Scores
-from velatura.benchmark.stacks import KINDS
+from velatura.benchmark.stacks import EDITIONS
 from velatura.comparison import check_figure
 
 DARK = 0.12  # from here on numbers are white
@@ -30,7 +30,8 @@ def save_figure(scores: Sequence[Scores], path: str | Path) -> None:
     from matplotlib.colors import PowerNorm
     from matplotlib.figure import Figure
 
-    kinds: list[str | None] = [kind.name for kind in KINDS if any(kind.name in each.asked for each in scores)]
+    every = [kind.name for edition in EDITIONS.values() for kind in edition.kinds]
+    kinds: list[str | None] = [kind for kind in every if any(kind in each.asked for each in scores)]
     columns = [*kinds, None]
     order = sorted(scores, key=lambda each: (-each.summary()["records"], each.summary().get("variation", 0)))
     cells = [[each.summary(kind) if kind in (None, *each.asked) else {} for kind in columns] for each in order]

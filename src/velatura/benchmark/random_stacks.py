@@ -1,6 +1,6 @@
 """Random layers and stacks of every sort, drawn from a generator of NumPy.
 
-Indices lie in 1.1 to 2.2 and alpha in 0 to .55, where one in seven interfaces is smooth.
+Indices lie in 1.1 to 2.2 and alpha in 0 to .55, where one in seven interfaces is smooth, unless a function says else.
 """
 
 from __future__ import annotations
@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from velatura.stack import RGB, Diffuse, Interface, Layer, Medium, Stack
+from velatura.stack import RGB, Diffuse, Film, Interface, Layer, Medium, Stack
 
 # Layers of every sort ------------------------------------------------------------------------------------------------
 
@@ -129,7 +129,84 @@ def milky(rng: np.random.Generator, number: int) -> Stack:
     return Stack(layers, thin=bool(number % 2))
 
 
-# Stacks as people make them, where the model is weakest ---------------------------------------------------------------
+# Stacks as people make them ------------------------------------------------------------------------------------------
+
+ALUMINIUM: dict[str, Any] = {"eta": (1.35, 0.97, 0.62), "k": (7.47, 6.4, 5.3)}
+
+
+def anodised(rng: np.random.Generator, number: int) -> Stack:
+    """Aluminium with a film of oxide, which interferes, and under a thick one, which is dyed, in turns."""
+    alpha, oxide = float(rng.uniform(0.05, 0.4)), float(rng.uniform(1.6, 1.77))
+    if number % 2:
+        layers: list[Layer] = [Interface(eta=oxide, alpha=float(rng.uniform(0.02, 0.3))), absorbing(rng)]
+        return Stack([*layers, Interface(alpha=alpha, **ALUMINIUM)])
+    film = Film(eta=oxide, thickness_nm=float(rng.uniform(80, 800)))
+    return Stack([Interface(alpha=alpha, films=(film,), **ALUMINIUM)])
+
+
+def car_paint(rng: np.random.Generator, number: int) -> Stack:
+    """A clear coat over a tinted medium with metal flakes, and over pigments, in turns."""
+    clear = Interface(eta=float(rng.uniform(1.45, 1.55)), alpha=float(rng.uniform(0.0, 0.05)))
+    if number % 2:
+        return Stack([clear, scattering(rng), diffuse(rng)])
+    return Stack([clear, absorbing(rng), Interface(alpha=float(rng.uniform(0.2, 0.5)), **ALUMINIUM)])
+
+
+def varnished(rng: np.random.Generator, number: int) -> Stack:
+    """Wood under a varnish that yellows."""
+    varnish = Interface(eta=float(rng.uniform(1.45, 1.55)), alpha=float(rng.uniform(0.02, 0.3)))
+    yellow = Medium(sigma_a=_colour(rng.uniform(0, 1) * np.array([0.1, 0.3, 0.9])))
+    wood = _colour(rng.uniform(0.4, 1) * np.array([0.75, 0.5, 0.3]))
+    return Stack([varnish, yellow, Diffuse(albedo=wood)])
+
+
+def glazed(rng: np.random.Generator, number: int) -> Stack:
+    """A milky glaze on a diffuse body, and on one that passes light, in turns."""
+    glaze = Interface(eta=float(rng.uniform(1.5, 1.6)), alpha=float(rng.uniform(0.0, 0.25)))
+    body = Interface(eta=float(rng.uniform(1.4, 1.7)), alpha=float(rng.uniform(0.1, 0.5)))
+    return Stack([glaze, scattering(rng), body if number % 2 else diffuse(rng)])
+
+
+def wet_asphalt(rng: np.random.Generator, number: int) -> Stack:
+    """Bitumen under water."""
+    water = Interface(eta=1.33, alpha=float(rng.uniform(0.0, 0.15)))
+    bitumen = Interface(eta=float(rng.uniform(1.5, 1.65)), alpha=float(rng.uniform(0.2, 0.5)))
+    return Stack([water, bitumen, Diffuse(albedo=float(rng.uniform(0.02, 0.1)))])
+
+
+def many_coats(rng: np.random.Generator, number: int) -> Stack:
+    """Four to six dielectrics over a base."""
+    return coated(rng, 4 + number % 3)
+
+
+def very_smooth(rng: np.random.Generator, number: int) -> Stack:
+    """Two coats over a metal, solids of two interfaces, and panes in turn, of alpha .005 to .03."""
+    first, second = (
+        Interface(eta=float(rng.uniform(1.3, 1.7)), alpha=float(rng.uniform(0.005, 0.03))) for _ in range(2)
+    )
+    if number % 3 == 2:
+        return Stack([first, Interface(eta=1.0, alpha=second.alpha)], thin=True)
+    eta, k = _metal(rng, 1.5, 5.0)
+    metal = [] if number % 3 else [Interface(eta=eta, k=k, alpha=float(rng.uniform(0.005, 0.03)))]
+    return Stack([first, second, *metal])
+
+
+def large_steps(rng: np.random.Generator, number: int) -> Stack:
+    """A dense coat over metal, every second one below a coat of an index about 1.5."""
+    dense = Interface(eta=float(rng.uniform(2.4, 3.5)), alpha=float(rng.uniform(0.02, 0.5)))
+    coats = [Interface(eta=float(rng.uniform(1.4, 1.6)), alpha=float(rng.uniform(0.02, 0.5)))] if number % 2 else []
+    eta, k = _metal(rng, 1.5, 5.0)
+    return Stack([*coats, dense, Interface(eta=eta, k=k, alpha=float(rng.uniform(0.02, 0.5)))])
+
+
+def dark(rng: np.random.Generator, number: int) -> Stack:
+    """A coat over a medium that absorbs most, and below that a dark base, or another dielectric, in turns."""
+    outer = Interface(eta=float(rng.uniform(1.3, 1.7)), alpha=float(rng.uniform(0.02, 0.5)))
+    black = Diffuse(albedo=_colour(rng.uniform(0.02, 0.2, 3)))
+    return Stack([outer, Medium(sigma_a=_colour(rng.uniform(0.3, 1.5, 3))), coat(rng) if number % 2 else black])
+
+
+# Those where the model is weakest
 
 
 def lacquered(rng: np.random.Generator, number: int) -> Stack:

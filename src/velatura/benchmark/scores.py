@@ -17,7 +17,7 @@ from velatura import files
 from velatura.benchmark import candidates
 from velatura.benchmark.candidates import Candidate, Factory
 from velatura.benchmark.cost import median_cost
-from velatura.benchmark.stacks import FORMAT, KINDS, Case, chosen
+from velatura.benchmark.stacks import Case, chosen, known
 from velatura.benchmark.walks import Binned, truth
 from velatura.errors import InvalidInput
 from velatura.light.polar_bins import RADII
@@ -59,7 +59,8 @@ class Record:
 @dataclass(frozen=True)
 class Scores:
     """All records of a candidate; `asked` is their number if it expressed every stack, by kind; `refused` counts
-    reasons; cost is that of an evaluation over one of `roughconductor`, None where it was not measured or is no plugin.
+    reasons; cost is that of an evaluation over one of `roughconductor`, None where it was not measured or is no plugin;
+    edition is the number of that of the stacks.
     """
 
     name: str
@@ -67,6 +68,7 @@ class Scores:
     asked: Mapping[str, int]
     refused: Mapping[str, int]
     cost: float | None = None
+    edition: int = 1
     __pydantic_config__: ClassVar[ConfigDict] = NUMBERS
 
     def summary(self, kind: str | None = None) -> dict[str, float]:
@@ -98,7 +100,7 @@ class Scores:
     def to_dict(self) -> dict[str, Any]:
         """All numbers, for JSON."""
         summary = {"all": self.summary(), **{kind: self.summary(kind) for kind in self.asked}}
-        return {"format": FORMAT, "summary": summary, **asdict(self)}
+        return {"format": known(self.edition).format, "summary": summary, **asdict(self)}
 
 
 def score(
@@ -106,6 +108,7 @@ def score(
     name: str = "candidate",
     kinds: Sequence[str] | None = None,
     progress: Callable[[int, int], None] | None = None,
+    edition: int = 1,
 ) -> Scores:
     """Score a model on the stacks of the benchmark.
 
@@ -116,15 +119,17 @@ def score(
             function with a method `sample(wi, u)`, which gives weights (n, 3), is asked for the noise of its samples.
         kinds: of stacks; None for all.
         progress: called with (stacks done, all stacks).
+        edition: 1, stacks of every sort, or 2, stacks as people make them, up to grazing angles.
 
     Raises:
-        InvalidInput: an unknown kind, or in a line that begins with the stack: what is no candidate; one that fails or
-            calls `sys.exit`, with its error as the cause; values of another shape or type, negative or infinite.
+        InvalidInput: an unknown kind or edition, or in a line that begins with the stack: what is no candidate; one
+            that fails or calls `sys.exit`, with its error as the cause; values of another shape or type, negative or
+            infinite.
         MissingTool: LLVM is missing or too old.
     """
-    cases, true = chosen(kinds), truth()
+    cases, true = chosen(kinds, edition), truth(edition)
     records: list[Record] = []
-    asked: dict[str, int] = {kind.name: 0 for kind in KINDS if kind.name in {case.kind for case in cases}}
+    asked: dict[str, int] = dict.fromkeys([case.kind for case in cases], 0)
     refused: Counter[str] = Counter()
     for n, case in enumerate(cases):
         mine = {
@@ -147,7 +152,7 @@ def score(
             records += [_record(case, key, found[key], mine[key], spreads.get(key[0])) for key in kept]
         if progress:
             progress(n + 1, len(cases))
-    return Scores(name, tuple(records), asked, dict(refused))
+    return Scores(name, tuple(records), asked, dict(refused), edition=edition)
 
 
 def kept_score(
@@ -157,6 +162,7 @@ def kept_score(
     kinds: Sequence[str] | None = None,
     timed: bool = False,
     progress: Callable[[int, int], None] | None = None,
+    edition: int = 1,
 ) -> Scores:
     """Scores from a JSON file if that is there, else of `score` and kept there; not kept where it is None.
 
@@ -171,16 +177,16 @@ def kept_score(
         except ValidationError as error:
             at, why = error.errors()[0]["loc"], error.errors()[0]["msg"]
             raise InvalidInput(f"{path}: holds no scores: {'.'.join(map(str, at))}: {why}") from None
-        if set(found.asked) != {case.kind for case in chosen(kinds)}:
+        if set(found.asked) != {case.kind for case in chosen(kinds, edition)}:
             raise InvalidInput(f"{path}: holds scores of other kinds of stacks; give another folder")
         if found.cost is not None or not timed:
             return found
     else:
         if path:
             files.make_folder(path.parent)
-        found = score(factory, name, kinds, progress)
+        found = score(factory, name, kinds, progress, edition)
     if timed:
-        found = replace(found, cost=median_cost(factory, chosen(kinds)))
+        found = replace(found, cost=median_cost(factory, chosen(kinds, edition)))
     if path:
         with files.whole(path) as unfinished:
             unfinished.write_text(json.dumps(found.to_dict(), allow_nan=False), encoding="utf-8")

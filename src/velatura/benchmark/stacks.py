@@ -1,31 +1,33 @@
-"""The stacks of the benchmark, by kind, drawn from one seed, and the directions that light comes from."""
+"""The stacks of the benchmark, by edition and kind, drawn from one seed, and the directions that light comes from."""
 
 from __future__ import annotations
 
 import json
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cache
 from importlib import resources
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from velatura.benchmark import random_stacks
 from velatura.benchmark.random_stacks import base, clear, cloudy, coat, coated, milky, painted, tinted
 from velatura.errors import InvalidInput
 from velatura.stack import Film, Interface, LayerValues, Material, Stack, as_described
-from velatura.stack.schema import unknown
+from velatura.stack.schema import show, unknown
+
+if TYPE_CHECKING:
+    from importlib.abc import Traversable
 
 Array = NDArray[np.floating]
 
-FORMAT = "layered-benchmark 1"
-SEED, OF_EACH = 2026, 10  # of the edition: its random numbers, and stacks of each kind
-DATA = resources.files("velatura.benchmark") / "layered-benchmark-1"
+SCHEMA = resources.files("velatura.benchmark") / "schema.json"
 
-LEAST, LEAST_BRUSHED = 0.02, 0.05  # alpha, so that a model can be evaluated
 COSINES = (0.98, 0.8, 0.5, 0.25)  # of light on opaque stacks
 THROUGH = (0.9, 0.45)  # on stacks that transmit, from either side
+GRAZING = (0.9, 0.5, 0.2, 0.08)  # on stacks of the second edition, from above
 OUTSIDE, MOMENTA, DEEP = 0.7, (0.3, 0.9, 1.05), 0.6  # on solids: from above; n sin from inside, and as in `_inside`
 LEAST_INDEX = 1.3  # of solids that are lit from inside
 DIGITS = 4
@@ -77,7 +79,7 @@ def _dense(stack: Stack) -> bool:
 class Kind:
     """Stacks that `draw` makes of random numbers and a running number, drawn again until one `fits`.
 
-    incident: "above", "both" sides, or "inside" with one direction from above.
+    incident: "above", "both" sides, "inside" with one direction from above, or "grazing", from above to there.
     """
 
     name: str
@@ -86,7 +88,7 @@ class Kind:
     incident: str = "above"
 
 
-KINDS = (
+FIRST = (
     Kind("one interface", _one, lambda stack: True, "both"),
     Kind("two interfaces", lambda rng, n: coated(rng, 1)),
     Kind("three interfaces", lambda rng, n: coated(rng, 2)),
@@ -101,6 +103,26 @@ KINDS = (
     Kind("from inside", lambda rng, n: clear(rng, 2 * n), _dense, "inside"),
 )
 
+#: Stacks as people make them. Very rough ones are panes: what very rough solids pass has an edge that no nodes resolve.
+SECOND = tuple(
+    Kind(name, draw, _opaque if draw is random_stacks.many_coats else lambda stack: True, "grazing")
+    for name, draw in (
+        ("anodised aluminium", random_stacks.anodised),
+        ("car paint", random_stacks.car_paint),
+        ("varnished wood", random_stacks.varnished),
+        ("glaze", random_stacks.glazed),
+        ("brushed under lacquer", random_stacks.lacquered),
+        ("frosted pane", random_stacks.frosted),
+        ("wet asphalt", random_stacks.wet_asphalt),
+        ("four to six coats", random_stacks.many_coats),
+        ("very smooth", random_stacks.very_smooth),
+        ("very rough", lambda rng, n: random_stacks.very_rough(rng, 2 * n + 1)),
+        ("large steps", random_stacks.large_steps),
+        ("dark", random_stacks.dark),
+        ("crossed brushing", random_stacks.crossed),
+    )
+)
+
 # Cases ---------------------------------------------------------------------------------------------------------------
 
 
@@ -108,7 +130,8 @@ KINDS = (
 class Case:
     """A stack of the benchmark, and the directions (N, 3) that light comes from, those from inside with z < 0.
 
-    often: whether light is scattered any number of times between the facets of an interface, or once.
+    often: whether light is scattered any number of times between the facets of an interface, or once; edition: its
+    number.
     """
 
     id: str
@@ -116,6 +139,7 @@ class Case:
     often: bool
     stack: Stack
     incident: Array
+    edition: int = 1
 
     @property
     def symmetric(self) -> bool:
@@ -141,12 +165,12 @@ class Case:
         }
 
     @classmethod
-    def from_dict(cls, fields: dict[str, Any]) -> Case:
-        """The inverse of `to_dict`."""
+    def from_dict(cls, fields: dict[str, Any], edition: int) -> Case:
+        """The inverse of `to_dict`, for a case of an edition."""
         stack = Stack.from_dict(fields["material"])
         incident = np.array(fields["incident"])
         incident.flags.writeable = False  # candidates are handed it
-        return cls(fields["id"], fields["kind"], fields["bounces"] == "any", stack, incident)
+        return cls(fields["id"], fields["kind"], fields["bounces"] == "any", stack, incident, edition)
 
 
 def _explicit(layer: LayerValues) -> dict[str, Any]:
@@ -157,47 +181,98 @@ def _explicit(layer: LayerValues) -> dict[str, Any]:
     return {"kind": layer.kind, **values, **colours, **({"films": films} if films else {})}
 
 
-def drawn(kind: Kind, number: int, seed: int = SEED) -> Case:
-    """A case of the benchmark, independent of the others that are drawn."""
-    rng = np.random.default_rng([seed, number, *kind.name.encode()])
-    stack = _written(_until(lambda: kind.draw(rng, number), kind.fits))
-    id = f"{kind.name.replace(' ', '-')}-{number:02d}"
-    stack = stack.replace(name=id)
-    turns = rng.integers(0, 180, 8)  # degrees, where there is no symmetry
-    case = Case(id, kind.name, number // 2 % 2 == 1, stack, np.empty((0, 3)))
-    cosines = np.array(_cosines(kind, stack))
-    phi = np.radians(turns[: len(cosines)]) * (not case.symmetric)
-    sine = np.sqrt(1 - cosines**2)
-    incident = np.stack([sine * np.cos(phi), sine * np.sin(phi), cosines], axis=1)
-    return replace(case, incident=incident)
+# Editions ------------------------------------------------------------------------------------------------------------
 
 
-def all_drawn(of_each: int = OF_EACH, seed: int = SEED) -> Iterator[Case]:
-    """Every case of an edition."""
-    return (drawn(kind, number, seed) for kind in KINDS for number in range(of_each))
+@dataclass(frozen=True)
+class Edition:
+    """Stacks of some kinds, `of_each` drawn from random numbers of a `seed`.
+
+    least, least_brushed: alpha of interfaces of one and of two roughnesses, so that a model can be evaluated; often:
+    whether facets are met often in all stacks, or in four of ten; central: nodes of candidates in the first row of
+    bins, None for as many as in others.
+    """
+
+    number: int
+    kinds: tuple[Kind, ...]
+    seed: int
+    of_each: int
+    least: float
+    least_brushed: float
+    often: bool
+    central: int | None
+
+    @property
+    def format(self) -> str:
+        return f"layered-benchmark {self.number}"
+
+    @property
+    def data(self) -> Traversable:
+        """The folder of its files."""
+        return resources.files("velatura.benchmark") / self.format.replace(" ", "-")
+
+    def drawn(self, kind: Kind, number: int, seed: int | None = None) -> Case:
+        """A case, independent of the others that are drawn; of another seed than the edition's, if one is given."""
+        rng = np.random.default_rng([self.seed if seed is None else seed, number, *kind.name.encode()])
+        stack = _written(_until(lambda: kind.draw(rng, number), kind.fits), self.least, self.least_brushed)
+        id = f"{kind.name.replace(' ', '-')}-{number:02d}"
+        stack = stack.replace(name=id)
+        turns = rng.integers(0, 180, 8)  # degrees, where there is no symmetry
+        case = Case(id, kind.name, self.often or number // 2 % 2 == 1, stack, np.empty((0, 3)), self.number)
+        cosines = np.array(_cosines(kind, stack))
+        phi = np.radians(turns[: len(cosines)]) * (not case.symmetric)
+        sine = np.sqrt(1 - cosines**2)
+        incident = np.stack([sine * np.cos(phi), sine * np.sin(phi), cosines], axis=1)
+        return replace(case, incident=incident)
+
+    def all_drawn(self, of_each: int | None = None, seed: int | None = None) -> Iterator[Case]:
+        """Every case, or others of its kinds."""
+        numbers = range(of_each or self.of_each)
+        return (self.drawn(kind, number, seed) for kind in self.kinds for number in numbers)
+
+
+EDITIONS: Mapping[int, Edition] = {
+    1: Edition(1, FIRST, seed=2026, of_each=10, least=0.02, least_brushed=0.05, often=False, central=None),
+    2: Edition(2, SECOND, seed=2027, of_each=6, least=0.005, least_brushed=0.02, often=True, central=16),
+}
+
+
+def known(number: int) -> Edition:
+    """The edition of that number.
+
+    Raises:
+        InvalidInput: there is none.
+    """
+    if number not in EDITIONS:
+        raise InvalidInput(f"edition: must be one of {', '.join(map(str, EDITIONS))}, got {show(number)}")
+    return EDITIONS[number]
 
 
 @cache
-def edition() -> tuple[Case, ...]:
-    """The cases that come with the package."""
-    found = json.loads((DATA / "stacks.json").read_text(encoding="utf-8"))
-    return tuple(Case.from_dict(fields) for fields in found["stacks"])
-
-
-def chosen(kinds: Sequence[str] | None = None) -> tuple[Case, ...]:
-    """The cases of some kinds that come with the package; of all if there are none.
+def edition(number: int = 1) -> tuple[Case, ...]:
+    """The cases of an edition that come with the package.
 
     Raises:
-        InvalidInput: an unknown kind.
+        InvalidInput: an unknown edition.
     """
-    names = [kind.name for kind in KINDS]
+    found = json.loads((known(number).data / "stacks.json").read_text(encoding="utf-8"))
+    return tuple(Case.from_dict(fields, number) for fields in found["stacks"])
+
+
+def chosen(kinds: Sequence[str] | None = None, number: int = 1) -> tuple[Case, ...]:
+    """The cases of some kinds of an edition that come with the package; of all if there are none.
+
+    Raises:
+        InvalidInput: an unknown edition or kind.
+    """
+    names = [kind.name for kind in known(number).kinds]
     for name in kinds or ():
         if name not in names:
             raise InvalidInput(unknown("kind", name, names))
-    return tuple(case for case in edition() if not kinds or case.kind in kinds)
+    return tuple(case for case in edition(number) if not kinds or case.kind in kinds)
 
 
-def _written(stack: Stack) -> Stack:
+def _written(stack: Stack, least_alpha: float, least_brushed: float) -> Stack:
     """The stack with its numbers rounded as they are written, and no interface too smooth."""
     flat = stack.flat()
     least = {}
@@ -205,7 +280,7 @@ def _written(stack: Stack) -> Stack:
         if name.endswith("_alpha_u"):
             both = name, f"{name[:-1]}v"
             brushed = flat[both[0]] != flat[both[1]]
-            least.update(dict.fromkeys(both, LEAST_BRUSHED if brushed else LEAST))
+            least.update(dict.fromkeys(both, least_brushed if brushed else least_alpha))
 
     def rounded(name: str, value: Any) -> Any:
         if isinstance(value, tuple):
@@ -217,6 +292,8 @@ def _written(stack: Stack) -> Stack:
 
 def _cosines(kind: Kind, stack: Stack) -> list[float]:
     """Those of the directions of incidence; negative from inside."""
+    if kind.incident == "grazing":
+        return list(GRAZING)
     if kind.incident == "inside":
         return [OUTSIDE, *_inside(stack)]
     return [*THROUGH, *(-c for c in THROUGH)] if stack.transmits else list(COSINES)

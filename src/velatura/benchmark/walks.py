@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from velatura import files
-from velatura.benchmark.stacks import DATA, FORMAT, OF_EACH, SEED, Case, all_drawn
+from velatura.benchmark.stacks import EDITIONS, Case, Edition, known
 from velatura.light.polar_bins import AZIMUTHAL, RADIAL, RADII, SIDES, Bins, mirrored
 from velatura.reference.batches import ends
 from velatura.reference.statistics import moments
@@ -57,13 +57,14 @@ class Light(Binned):
 # Walk ----------------------------------------------------------------------------------------------------------------
 
 
-def walked(case: Case, direction: int, paths: int = PATHS, seed: int = SEED) -> dict[str, Light]:
-    """The light of a case from one of its directions, by side.
+def walked(case: Case, direction: int, paths: int = PATHS, seed: int | None = None) -> dict[str, Light]:
+    """The light of a case from one of its directions, by side; by another seed than its edition's, if one is given.
 
     Raises:
         MissingTool: LLVM is missing or too old.
     """
     wi = case.incident[direction]
+    seed = EDITIONS[case.edition].seed if seed is None else seed
     (number,) = np.random.SeedSequence([seed, direction, *case.id.encode()]).generate_state(1)
     found = ends(case.stack, wi, paths, int(number), case.often)
     above = found.w[2] > 0
@@ -95,20 +96,24 @@ def _light(bins: Bins, wo: Array, weight: Array, paths: int, symmetric: bool) ->
 
 def walk_all(
     folder: Path,
-    of_each: int = OF_EACH,
+    of_each: int | None = None,
     paths: int = PATHS,
-    seed: int = SEED,
+    seed: int | None = None,
     progress: Callable[[int, int], None] | None = None,
+    edition: int = 1,
 ) -> None:
-    """Walk through all stacks, and write the edition into a folder: `stacks.json`, `truth.npz`, `energies.csv`.
+    """Walk through all stacks of an edition, and write them into a folder: `stacks.json`, `truth.npz`, `energies.csv`.
 
-    Walks of single stacks are kept in a folder of it, and are not repeated.
+    Walks of single stacks are kept in a folder of it, and are not repeated. Another seed makes other stacks of the same
+    kinds.
 
     Raises:
-        InvalidInput: the folder cannot be written.
+        InvalidInput: an unknown edition, or the folder cannot be written.
         MissingTool: LLVM is missing or too old.
     """
-    cases = list(all_drawn(of_each, seed))
+    chosen = known(edition)
+    seed = chosen.seed if seed is None else seed
+    cases = list(chosen.all_drawn(of_each, seed))
     kept = folder / f"walks-seed-{seed}-paths-{paths}"
     files.make_folder(kept)
     lights: dict[Key, Light] = {}
@@ -117,7 +122,7 @@ def walk_all(
             lights[n, direction, side] = light
         if progress:
             progress(n + 1, len(cases))
-    write(folder, cases, lights, paths, seed)
+    write(folder, chosen, cases, lights, paths, seed)
 
 
 def _kept(case: Case, paths: int, seed: int, path: Path) -> dict[tuple[int, int], Light]:
@@ -146,14 +151,16 @@ def _kept(case: Case, paths: int, seed: int, path: Path) -> dict[tuple[int, int]
 # Files ---------------------------------------------------------------------------------------------------------------
 
 
-def write(folder: Path, cases: Iterable[Case], lights: Mapping[Key, Light], paths: int, seed: int) -> None:
-    """Write an edition.
+def write(
+    folder: Path, edition: Edition, cases: Iterable[Case], lights: Mapping[Key, Light], paths: int, seed: int
+) -> None:
+    """Write cases of an edition.
 
     Raises:
         InvalidInput: the folder cannot be written.
     """
     cases = list(cases)
-    about = {"format": FORMAT, "seed": seed, "paths": paths, "radii": RADII.tolist(), "azimuths": AZIMUTHAL}
+    about = {"format": edition.format, "seed": seed, "paths": paths, "radii": RADII.tolist(), "azimuths": AZIMUTHAL}
     lines = ",\n".join(json.dumps(case.to_dict()) for case in cases)
     text = f'{json.dumps(about)[:-1]},\n"stacks": [\n{lines}\n]}}\n'
     with files.whole(folder / "stacks.json") as unfinished:
@@ -198,10 +205,15 @@ def _row(case: Case, key: Key, light: Light) -> list[str]:
 
 
 @cache
-def truth() -> Mapping[tuple[str, int, str], Light]:
-    """The truth that comes with the package, by stack, direction, and side; not to be written to."""
-    ids = [fields["id"] for fields in json.loads((DATA / "stacks.json").read_text(encoding="utf-8"))["stacks"]]
-    with (DATA / "truth.npz").open("rb") as stream, np.load(stream) as found:
+def truth(edition: int = 1) -> Mapping[tuple[str, int, str], Light]:
+    """The truth of an edition that comes with the package, by stack, direction, and side; not to be written to.
+
+    Raises:
+        InvalidInput: an unknown edition.
+    """
+    data = known(edition).data
+    ids = [fields["id"] for fields in json.loads((data / "stacks.json").read_text(encoding="utf-8"))["stacks"]]
+    with (data / "truth.npz").open("rb") as stream, np.load(stream) as found:
         arrays = {name: found[name].astype(float) for name in _names()}
         for array in arrays.values():
             array.flags.writeable = False

@@ -26,6 +26,10 @@ Kinds = Annotated[
     list[str] | None, typer.Option("--kind", metavar="KIND", help="Stacks of this kind only; may be repeated.")
 ]
 
+Edition = Annotated[
+    int, typer.Option("--edition", metavar="N", help="1: stacks of every sort; 2: as people make them.")
+]
+
 
 @app.command()
 def score(
@@ -37,6 +41,7 @@ def score(
         Path | None,
         typer.Option(metavar="F", help="Values of a model of your own (.npy), at the pairs of `benchmark pairs`."),
     ] = None,
+    edition: Edition = 1,
     kinds: Kinds = None,
     cost: Annotated[bool, typer.Option("--cost", help="Measure what an evaluation costs as well.")] = False,
     keep: Annotated[
@@ -57,14 +62,14 @@ def score(
         check_figure(plot)
     if values and kinds:
         raise InvalidInput("--values: holds all kinds of stacks; not together with --kind")
-    own = dict([_from_file(values)]) if values else {}
+    own = dict([_from_file(values, edition)]) if values else {}
     names = models.split(",") if models else [] if values else list(benchmark.ENTRANTS)
     factories = {**{name: benchmark.entrant(name) for name in names}, **own}
     found = []
     for name, factory in factories.items():
         with progress.bar(f"Scoring {name}") as advance:
             place = keep and keep / f"{name}.json"
-            found.append(benchmark.kept_score(place, factory, name, kinds, cost, advance))
+            found.append(benchmark.kept_score(place, factory, name, kinds, cost, advance, edition))
     if plot:
         benchmark.save_figure(found, plot)
 
@@ -81,11 +86,12 @@ def pairs(
         Path,
         typer.Option("--output", "-o", parser=options.folder, metavar="FOLDER", help="For stacks.json and pairs.npz."),
     ],
+    edition: Edition = 1,
 ) -> None:
     """Write the stacks, and the pairs of directions that `score --values` takes values of."""
     from velatura import benchmark
 
-    count = benchmark.write_task(output)
+    count = benchmark.write_task(output, edition)
     print(f"{output}: stacks.json; pairs.npz, {count} pairs")
 
 
@@ -95,19 +101,25 @@ def truth(
         Path,
         typer.Option("--output", "-o", parser=options.folder, metavar="FOLDER", help="Continued where it was begun."),
     ],
-    stacks: Annotated[int, typer.Option(min=1, max=20, metavar="N", help="Of each kind.")] = 10,
+    edition: Edition = 1,
+    stacks: Annotated[
+        int | None, typer.Option(min=1, max=20, metavar="N", help="Of each kind; default: as many as the edition has.")
+    ] = None,
     paths: Annotated[int, typer.Option(min=2, max=2**24, metavar="N", help="Random walks for each direction.")] = 2**21,
-    seed: Annotated[int, typer.Option(min=0, max=2**31 - 1, metavar="N", help="Seed of stacks and walks.")] = 2026,
+    seed: Annotated[
+        int | None,
+        typer.Option(min=0, max=2**31 - 1, metavar="N", help="Seed of stacks and walks; default: the edition's."),
+    ] = None,
 ) -> None:
     """Walk through all stacks again: the truth as the package has it, or that of another seed."""
     from velatura import benchmark
 
     with progress.bar("Walking") as advance:
-        benchmark.walk_all(output, stacks, paths, seed, advance)
+        benchmark.walk_all(output, stacks, paths, seed, advance, edition)
     print(f"{output}: stacks.json, truth.npz, energies.csv")
 
 
-def _from_file(path: Path) -> tuple[str, Factory]:
+def _from_file(path: Path, edition: int) -> tuple[str, Factory]:
     """The name of a candidate, and the values that a file has of it."""
     from velatura import benchmark
 
@@ -115,7 +127,7 @@ def _from_file(path: Path) -> tuple[str, Factory]:
     if name in benchmark.ENTRANTS:
         raise InvalidInput(f"{path}: --values: has the name of an entrant; rename the file")
     try:
-        return name, benchmark.from_values(benchmark.values_of(path), benchmark.edition())
+        return name, benchmark.from_values(benchmark.values_of(path), benchmark.edition(edition))
     except InvalidInput as error:
         raise InvalidInput(f"{path}: {str(error).removeprefix(f'{path}: ')}") from None
 

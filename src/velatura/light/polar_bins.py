@@ -22,6 +22,7 @@ FINEST = 0.01
 RADII = np.array([0.0, *np.geomspace(FINEST, 1, RADIAL)])
 FARTHEST = 0.97  # of the centre from the middle of the disc, where light is totally reflected
 NODES = 4  # along either side of a bin
+CROWDED = 4  # power by which nodes of the first row crowd towards the centre, where there are more of them
 
 SIDES = ("reflected", "transmitted")
 
@@ -56,25 +57,36 @@ class Bins:
         column = np.clip(((phi + pi) / (2 * pi) * AZIMUTHAL).astype(int), 0, AZIMUTHAL - 1)
         return np.asarray(row * AZIMUTHAL + column)
 
-    def nodes(self, count: int = NODES) -> tuple[Array, Array]:
-        """Directions (3, n) and solid angles (n,): `count` squared nodes for each bin, bin by bin."""
+    def nodes(self, count: int = NODES, central: int | None = None) -> tuple[Array, Array]:
+        """Directions (3, n) and solid angles (n,): `count` squared nodes for each bin, bin by bin.
+
+        `central` are those along t in the first row, where they crowd towards the centre, for lobes that are narrow.
+        """
         x, w = gauss(count)
-        t = (RADII[:-1, None] + np.diff(RADII)[:, None] * x).ravel()
-        dt = (np.diff(RADII)[:, None] * w).ravel()
+        t, dt = RADII[:-1, None] + np.diff(RADII)[:, None] * x, np.diff(RADII)[:, None] * w
+        rows = [(t, dt)]
+        if central:
+            x_0, w_0 = gauss(central)
+            first = FINEST * x_0**CROWDED, FINEST * CROWDED * x_0 ** (CROWDED - 1) * w_0
+            rows = [(first[0][None], first[1][None]), (t[1:], dt[1:])]
         step = 2 * pi / AZIMUTHAL
         phi = (step * (np.arange(AZIMUTHAL)[:, None] + x)).ravel() - pi
-        rim = self._rim(phi)
-        area = np.outer(t * dt, rim**2 * np.tile(step * w, AZIMUTHAL))
+        rim, width = self._rim(phi), np.tile(step * w, AZIMUTHAL)
+        parts = [self._nodes(*each, phi, rim, width) for each in rows]
+        return np.concatenate([wo for wo, _ in parts], axis=1), np.concatenate([weight for _, weight in parts])
+
+    def _nodes(self, t: Array, dt: Array, phi: Array, rim: Array, width: Array) -> tuple[Array, Array]:
+        """Nodes of rows t (rows, n) of widths dt, and of azimuths of their distances from the rim, and widths."""
         away = np.outer(t, rim)
         px, py = self._turned(self.centre + away * np.cos(phi), away * np.sin(phi), self.forward)
         cosine = np.sqrt(np.maximum(1 - px * px - py * py, 1e-12))
-        parts = px, py, cosine if self.up else -cosine, area / cosine
-        x, y, z, weight = (self._by_bin(part, count) for part in parts)
-        return np.stack([x, y, z]), weight
+        weight = np.outer(t * dt, rim**2 * width) / cosine
 
-    def _by_bin(self, values: Array, count: int) -> Array:
-        """Values over t and phi, with those of one bin together."""
-        return values.reshape(RADIAL, count, AZIMUTHAL, count).swapaxes(1, 2).reshape(-1)
+        def by_bin(values: Array) -> Array:
+            """Values over t and phi, with those of one bin together."""
+            return values.reshape(*t.shape, AZIMUTHAL, -1).swapaxes(1, 2).reshape(-1)
+
+        return np.stack([by_bin(each) for each in (px, py, cosine if self.up else -cosine)]), by_bin(weight)
 
     def _rim(self, phi: Array) -> Array:
         """Distance from the centre to the rim of the disc."""
