@@ -8,7 +8,7 @@ computes. After the figure's name stand the keys that lead to the number; an ite
 number with a standard error (`x` beside `x_error`) is printed with it, others to three places, or to as many as ` to 2`
 asks for; text stands as it is. Numbers of a page's own lie beside it, as `docs/explanation/validation.json`.
 
-`<!-- table validation: media/truths -->` becomes a table of such a list, a row for each item, with two digits.
+`<!-- table validation: media/truths -->` becomes a table of such a list, a row for each item, to two digits.
 
 A link to a script in `docs/examples` becomes one to its page in the gallery, where it stands with its picture.
 
@@ -228,7 +228,11 @@ def _table(name: str, path: str) -> str:
 
 
 def _cell(value: Any) -> str:
-    return re.sub(r"^0\.", ".", f"{value:.2g}") if isinstance(value, float) else str(value)
+    if value is None:
+        return ""
+    if not isinstance(value, float):
+        return str(value)
+    return f"{value:.0f}" if abs(value) >= 100 else re.sub(r"^0\.", ".", f"{value:.2g}")
 
 
 def _found(name: str, path: list[str]) -> tuple[Any, Any]:

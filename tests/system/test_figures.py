@@ -50,6 +50,13 @@ SMALL: dict[str, dict[str, Any]] = {
         "spp": 24,
         "paths": 30_000,
     },
+    "cost-error": {
+        "names": ("velatura", "weier2020", "weier2020-symmetric"),
+        "kinds": ["wet asphalt"],
+        "stacks": ("wet-asphalt-00",),
+        "rounds": 1,
+        "lanes": 2**12,
+    },
     "bati2021-01": {"size": 16, "spp": 2},
     "bati2021-04": {"count": 8},
     "bati2021-05": {"size": 16, "spp": 2},
@@ -550,6 +557,13 @@ def test_films_keep_their_colours_under_coats(made: Made) -> None:
         assert max(cell["difference"]["velatura"]) < 1.5 and abs(cell["worst"]["velatura"]) < 0.01, cell["name"]
         assert all(cell["mean"][who] > 1.5 for who in ("OpenPBR", "Blender", "MaterialX, OSL")), cell["name"]
         assert all(cell["mean"][who] > 10 for who in ("Blender", "MaterialX, OSL")), cell["name"]
+
+
+def test_cost_and_error_are_on_one_figure(made: Made) -> None:
+    """Expected: ours nearer to walks than a published model, which costs more than one lobe in either form."""
+    found = {each["name"]: each for each in made("cost-error")["entrants"]}
+    assert found["velatura"]["variation"] < 0.5 * found["weier2020"]["variation"]
+    assert all(each["evaluation"] > 1 and each["change"] > 0 and each["share"] == 1 for each in found.values())
 
 
 def test_every_figure_is_tried_here_and_is_found_by_its_name() -> None:

@@ -48,12 +48,12 @@ MAY_IMPORT = {
     "benchmark": "light stack optics model reference checks comparison api kernel bakes programs",
     "progress": "",
     "sweeps": "stack optics model inverse reference checks api kernel progress",
-    "figures": "stack optics ops films model inverse reference checks scenes comparison api kernel",
+    "figures": "stack optics ops films model inverse reference checks scenes comparison benchmark api kernel",
 }
 
 # The ends of the stream -> who may import them.
 IMPORTED_BY = {
-    "benchmark": "__init__ cli",
+    "benchmark": "__init__ cli figures",
     "cli": "__main__",
     "editor": "__init__ cli",
     "comparison": "__init__ figures cli benchmark",

@@ -82,10 +82,12 @@ def test_every_placeholder_of_a_page_resolves(hooks: ModuleType, page: Path) -> 
 
 
 def test_a_list_of_numbers_becomes_a_table(example: ModuleType, tmp_path: Path) -> None:
-    rows = [{"name": "a", "numbers": 3, "worst_case": 0.00123}, {"name": "b", "numbers": 4, "worst_case": 1e-7}]
+    values = (3, 0.00123), (None, 1e-7), (1234.5, 12.3)
+    rows = [{"name": name, "numbers": number, "worst_case": worst} for name, (number, worst) in zip("abc", values)]
     (tmp_path / "other.json").write_text(json.dumps({"rows": rows}))
-    printed = "|  | numbers | worst case |\n| --- | --- | --- |\n| a | 3 | .0012 |\n| b | 4 | 1e-07 |"
-    assert example.replaced("<!-- table other: rows -->") == printed
+    printed = ["|  | numbers | worst case |", "| --- | --- | --- |", "| a | 3 | .0012 |", "| b |  | 1e-07 |"]
+    printed.append("| c | 1234 | 12 |")
+    assert example.replaced("<!-- table other: rows -->").splitlines() == printed
 
 
 def test_the_page_shows_every_figure_beside_its_numbers() -> None:

@@ -21,6 +21,7 @@ Progress = Callable[[int, int], None]
 
 FIGURES = (
     "before-after",
+    "cost-error",
     "films-under-coats",
     "bati2021-01",
     "bati2021-04",
