@@ -148,6 +148,15 @@ MOMENTA = (0.3, 0.7, 0.9, 0.98, 1.05, 1.2, 1.4)  # n sin from inside
 ALONG = tuple(np.linspace(0, GLASS - 0.02, 38).tolist())  # of the picture
 SHOWN_ALPHAS = (0.05, 0.1, 0.3)
 FAINT = 0.02  # share of light from which on shapes are compared
+#: Interfaces and directions (not normalised) of Mitsuba's own tests of these plugins.
+TESTED: tuple[tuple[str, dict[str, Any], tuple[tuple[float, float, float], ...]], ...] = (
+    (
+        "roughdielectric",
+        {"eta": GLASS, "alpha": 0.5},
+        ((0.8, 0.3, 0.05), (0.5, 0, 0.5), (0.5, 0.5, 0.001), (0.2, -0.6, -0.5), (0.8, 0.3, -0.05)),
+    ),
+    ("roughconductor", {**METAL, "alpha": (0.2, 0.05)}, ((1, 1, 1),)),
+)
 LEAST = 1e-4  # 1/sr, from which on single values are
 #: Whether light comes from inside, and the side that it leaves to, as the page has it.
 WAYS = {
@@ -170,6 +179,8 @@ def interfaces() -> dict[str, Any]:
     for alpha in ALPHAS:
         inside = [-np.sqrt(1 - (p / GLASS) ** 2) for p in MOMENTA]
         rows += list(_compared("roughdielectric", _case(Interface(eta=GLASS, alpha=alpha), (*COSINES, *inside))))
+    for plugin, values, directions in TESTED:
+        rows += list(_compared(f"Mitsuba's tests, {plugin}", _lit(Interface(**values), np.array(directions))))
     for each in rows:
         remark = f"worst {each['worst']:.2g}; energy {each['energy']:.2g}; density {each['density']:.2g}"
         row("interfaces", each["name"], each["variation"], "", remark)
@@ -184,7 +195,12 @@ def interfaces() -> dict[str, Any]:
 def _case(interface: Interface, cosines: Any) -> benchmark.Case:
     z = np.array(cosines)
     azimuth = 0.5 * isinstance(interface.alpha, tuple)
-    incident = np.stack([np.sqrt(1 - z * z) * np.cos(azimuth), np.sqrt(1 - z * z) * np.sin(azimuth), z], axis=1)
+    sine = np.sqrt(1 - z * z)
+    return _lit(interface, np.stack([sine * np.cos(azimuth), sine * np.sin(azimuth), z], axis=1))
+
+
+def _lit(interface: Interface, directions: Array) -> benchmark.Case:
+    incident = directions / np.linalg.norm(directions, axis=1, keepdims=True)
     return benchmark.Case("interface", "one interface", False, Stack([interface]), incident)
 
 

@@ -83,6 +83,7 @@ def test_interfaces_are_as_the_page_has_them() -> None:
 def test_the_page_has_all_parts_measured_with_the_same_versions(tmp_path: Path) -> None:
     """Expected: a date and versions of each part, and a picture of what is printed."""
     assert list(PAGE) == list(validation.PARTS)
+    assert any(each["name"].startswith("Mitsuba's tests") for each in PAGE["interfaces"]["rows"])
     for part in PAGE.values():
         assert set(part["measured"]) == {"date", "commit", *validation.PACKAGES}
         assert part["measured"] | {"date": "", "commit": ""} == PAGE["media"]["measured"] | {"date": "", "commit": ""}
