@@ -31,6 +31,7 @@ Straight = Callable[[PhaseFunction], float]  # share of scattered light that cou
 THIN = 1e-4  # depth of the first layer, which scatters once at most: errors go as this depth
 EVENTS = 1000
 EVEN = 0.25  # of the events, in all directions alike, where few are drawn by a phase function with a peak
+HORIZON = 0.005  # cosine of directions that lie on both sides in part
 
 
 @dataclass(frozen=True)
@@ -124,7 +125,9 @@ def _events(
 ) -> tuple[list[Light], list[Value]]:
     (p, psi), (cosine, u_2, share), (n,) = sources, samples, numbers
     x, y, z = _deflected(p, psi, cosine, u_2, n)
-    return [Light(n * x, n * y, [ops.select(there, share, 0.0)]) for there in (z <= 0, z > 0)], []
+    # A direction that crosses the horizon goes over from one side to the other, so that light does not jump
+    down = ops.clip(0.5 * (1 + z / HORIZON), 0.0, 1.0)
+    return [Light(n * x, n * y, [side * share]) for side in (1 - down, down)], []
 
 
 def _deflected(p: Value, psi: Value, cosine: Value, u_2: Value, n: Value) -> Direction:
