@@ -37,7 +37,7 @@ class Walks:
     def __init__(
         self, cos_theta: Array, alpha: Array, paths: int, rng: np.random.Generator, alike: bool = False
     ) -> None:
-        self.rng, self.paths, self.meetings = rng, paths, 0
+        self.rng, self.paths, self.meetings, self._alike = rng, paths, 0, alike
         self.point = np.repeat(np.arange(len(alpha)), paths)
         self.alpha = alpha.astype(np.float32)[self.point]
         cosine = cos_theta.astype(np.float32)[self.point]
@@ -68,7 +68,7 @@ class Walks:
     def end_faint(self) -> Array:
         """End some of the faint walks; indices of those that go on."""
         carried = self.weight if self.weight.ndim == 1 else self.weight.mean(axis=0)
-        kept = np.flatnonzero(carried > FAINT * self.rng.random(len(self), dtype=np.float32))
+        kept = np.flatnonzero(carried > FAINT * self._random(1)[0])
         with np.errstate(divide="ignore", invalid="ignore"):
             self.weight = np.where(carried < FAINT, self.weight * (np.float32(FAINT) / carried), self.weight)
         self._take(kept)
@@ -115,7 +115,13 @@ class Walks:
     def _draw(self) -> Array:
         if 3 * self.meetings < len(self._numbers):
             return self._numbers[3 * self.meetings : 3 * self.meetings + 3, self._path]
-        return self.rng.random((3, len(self)), dtype=np.float32)
+        return self._random(3)
+
+    def _random(self, count: int) -> Array:
+        """Numbers (count, walks), those of a path where all points draw the same, however many have ended."""
+        if self._alike:
+            return self.rng.random((count, self.paths), dtype=np.float32)[:, self._path % self.paths]
+        return self.rng.random((count, len(self)), dtype=np.float32)
 
 
 def reverse(w: Direction) -> Direction:
