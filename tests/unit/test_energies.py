@@ -13,7 +13,7 @@ from velatura.model.solved.energies.adding import Leaving, indices, layers, part
 from velatura.model.solved.energies.energies import Energies, energies
 from velatura.model.solved.energies.interfaces import Setting
 from velatura.model.solved.energies.modes import RATIOS, Even, Relative
-from velatura.model.solved.energies.nodes import Nodes
+from velatura.model.solved.energies.nodes import CLOSE, Nodes
 from velatura.optics import fresnel, ggx
 from velatura.stack import Diffuse, Interface, Material, Medium, Stack
 
@@ -52,12 +52,20 @@ def test_nodes_lie_where_media_end() -> None:
 
 def test_a_step_of_an_index_keeps_the_number_of_nodes() -> None:
     """Where it would change by itself; where a part would be too short, nodes are those of the indices alone."""
-    like = [1.0, 1.5236, 1.3]
+    like = [1.0, 1.6912, 1.3]
     steps = [Nodes.of([1.0, like[1] + step, 1.3], 24) for step in (-0.03, 0.03)]
     held = [Nodes.of([1.0, like[1] + step, 1.3], 24, like) for step in (-0.03, 0.03)]
     assert steps[0].cells != steps[1].cells
     assert held[0].cells == held[1].cells == Nodes.of(like, 24).cells and held[0].ends == steps[0].ends
-    assert Nodes.of([1.0, 1.301, 1.3], 24, like) == Nodes.of([1.0, 1.301, 1.3], 24)
+    assert Nodes.of([1.0, 1.30001, 1.3], 24, like) == Nodes.of([1.0, 1.30001, 1.3], 24)
+
+
+@pytest.mark.parametrize("index", [1.0, 1.3])
+def test_light_does_not_jump_where_indices_share_an_end(index: float) -> None:
+    layers = Interface(eta=1.3, alpha=0.05), Interface(**GOLD, alpha=0.3)
+    ratios = CLOSE * (1 - 1e-9), CLOSE * (1 + 1e-9)
+    here, there = (reflected(solved(Stack([Interface(eta=index * r, alpha=0.1), *layers]))) for r in ratios)
+    assert there == pytest.approx(here, abs=2e-4)
 
 
 def test_many_media_share_nodes() -> None:
@@ -155,6 +163,13 @@ LOSSLESS: dict[str, list[Any]] = {
 @pytest.mark.parametrize("name", LOSSLESS)
 def test_lossless_stacks_keep_all_light(name: str) -> None:
     found = solved(Stack(LOSSLESS[name]))
+    assert (reflected(found) + found.passed)[0] == pytest.approx(np.ones(4), abs=1e-3)
+
+
+@pytest.mark.parametrize("alpha", [0.001, 0.002])
+def test_glass_that_is_brushed_most_keeps_its_light(alpha: float) -> None:
+    """Of light that it traps, modes of the azimuth leave a part out."""
+    found = solved(Stack([Interface(eta=1.5, alpha=[alpha, 0.3]), Interface(eta=1.0)]), phi=0.3)
     assert (reflected(found) + found.passed)[0] == pytest.approx(np.ones(4), abs=1e-3)
 
 

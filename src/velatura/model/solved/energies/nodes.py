@@ -20,10 +20,11 @@ from velatura.ops import Value
 
 Array = NDArray[np.floating]
 
-CLOSE = 1.04  # ratio of indices that share an end
-PARTS = 8  # at most: media that lie closer share an end where there are more
-SHORT = 1.01  # ratio of the ends of a part at least
+CLOSE = 1.0001  # ratio of indices that share an end
+PARTS = 8  # at most: where there are more, media share ends that lie apart by the least power of
+WIDER = 1.04
 INNER = 0.6  # share of nodes below the lowest index
+FURTHER = 1  # nodes more for each further medium, so that light hardly jumps where a part gets one of another
 STENCIL = 4
 QUADRATURE = 4000
 
@@ -46,22 +47,23 @@ class Nodes:
 
     @classmethod
     def of(cls, indices: Sequence[float], count: int, like: Sequence[float] | None = None) -> Nodes:
-        """Nodes for media of such indices, about `count`. Given media `like` these, as many as for them on each
+        """Nodes for media of such indices, about `count` for two. Given media `like` these, as many as for them on each
         part, so that results do not jump from one to the other, unless that leaves a part too short."""
         if like is None or len(like) != len(indices):
             like = indices
         media, close = _apart(like, CLOSE), CLOSE
         while len(media) > PARTS:
-            close *= CLOSE
+            close *= WIDER
             media = _apart(like, close)
         ends, known = ([0.0, *(float(n[k]) for k in media[:-1]), float(max(n))] for n in (indices, like))
-        if any(b < a * SHORT for a, b in pairwise(ends[1:])):
+        if any(b < a * CLOSE for a, b in pairwise(ends[1:])):
             return cls.of(indices, count)
         if len(ends) == 2:
             return cls(tuple(ends), (count - 1,))
         inner = int(INNER * count)
         lengths = [np.sqrt(1 - (a / b) ** 2) for a, b in pairwise(known[1:])]
-        outer = [max(STENCIL - 1, round((count - inner) * length / sum(lengths))) for length in lengths]
+        left = (count - inner + FURTHER * (len(lengths) - 1)) / sum(lengths)
+        outer = [max(STENCIL - 1, round(left * length)) for length in lengths]
         return cls(tuple(ends), (inner - 1, *outer))
 
     @cached_property
