@@ -28,6 +28,8 @@ from velatura.tables import Tables
 Array = NDArray[np.floating]
 T = TypeVar("T")
 
+RESOLVED = 50.0  # ratio of two roughnesses beyond which modes do not keep light that glass traps from growing
+
 
 @dataclass(frozen=True)
 class Setting:
@@ -90,7 +92,8 @@ def _smooth(facets: Facets, setting: Setting) -> Layer:
 def _rough(facets: Facets, setting: Setting) -> tuple[Layer, Layer]:
     # Light is not in beams any more below what is rough as a whole
     behind = setting if facets.smooth else setting.dark
-    facets = replace(facets, alpha_u=max(facets.alpha_u, ALPHA_MIN), alpha_v=max(facets.alpha_v, ALPHA_MIN))
+    least = max(ALPHA_MIN, max(facets.alpha_u, facets.alpha_v) / RESOLVED)
+    facets = replace(facets, alpha_u=max(facets.alpha_u, least), alpha_v=max(facets.alpha_v, least))
     nothing = Operator.nothing(setting.basis.size, len(setting.p))
     above = _Side.of(facets, setting)
     if facets.opaque or facets.final:
