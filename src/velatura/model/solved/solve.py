@@ -653,11 +653,13 @@ def _clipped(polynomial: Remainder, top: TopMedium | None, wi: Direction) -> tup
     if top:
         top = replace(top, **{k: _wider(getattr(top, k)) for k in ("albedo", "depth", "shares")})
         samples = TopSamples(numbers.samples, top)
-    wo = samples.sample((x, y, z), *low_discrepancy.at_nodes(1, 4 * EVENLY if top else EVENLY, None))
-    density = samples.density((x, y, z), wo)
-    light = top_medium.value(numbers, top, (x, y, z), wo) if top else numbers.value((x, y, z), wo)
-    value, unclipped = ops.divide(light, density), numbers.unclipped((x, y, z), wo)[1] * wo[2]
-    return (value - ops.divide(unclipped / np.pi, density)).mean(axis=-1), value.max(axis=-1)
+    # Not where it is sampled: directions of samples jump with the numbers
+    cosine, turn = low_discrepancy.fibonacci(4 * EVENLY if top else EVENLY)
+    sine, phi = np.sqrt(1 - cosine * cosine), 2 * np.pi * turn
+    wo = sine * np.cos(phi), sine * np.sin(phi), cosine
+    value = top_medium.value(numbers, top, (x, y, z), wo) if top else numbers.value((x, y, z), wo)
+    gained = value - numbers.unclipped((x, y, z), wo)[1] * (cosine / np.pi)
+    return 2 * np.pi * gained.mean(axis=-1), ops.divide(value, samples.density((x, y, z), wo)).max(axis=-1)
 
 
 def _wider(values: Any) -> Any:

@@ -127,7 +127,7 @@ class _Coat:
         """Share that it lets pass, at cosines outside."""
         if self.facets.films is None:
             return _Outlet(self.n, self.n_below / self.n)
-        return lambda cos_theta: np.asarray(ops.mean(self.facets.passing(_cosine(cos_theta, self.n))))
+        return lambda cos_theta: np.asarray(ops.mean(self.facets.passing(_cosine(cos_theta, self.n, 0.0))))
 
     def moved(self) -> Tensor:
         """Displacement of momentum in a refraction."""
@@ -146,7 +146,7 @@ class _Outlet:
     eta: float
 
     def __call__(self, cos_theta: Value) -> Value:
-        return 1 - fresnel.dielectric(_cosine(cos_theta, self.n), self.eta)
+        return 1 - fresnel.dielectric(_cosine(cos_theta, self.n, 0.0), self.eta)
 
 
 @dataclass(frozen=True)
@@ -321,9 +321,9 @@ def _of_event(phase: PhaseFunction) -> float:
     return 0.25 * (low + high) if share > 0 else 0.0
 
 
-def _cosine(cos_theta: Value, n: Value) -> Value:
+def _cosine(cos_theta: Value, n: Value, least: float = COS_OF_WIDTHS_MIN) -> Value:
     """Inside, by Snell's law."""
-    return ops.sqrt(1 - (1 - cos_theta * cos_theta) / (n * n), COS_OF_WIDTHS_MIN**2)
+    return ops.sqrt(1 - (1 - cos_theta * cos_theta) / (n * n), least**2)
 
 
 def _steeper(cosine: Array, width: Array, steepness: Sequence[float]) -> list[Array]:
