@@ -30,7 +30,7 @@ from velatura.renderer import compiled
 Array = NDArray[np.floating]
 
 #: Ratios of two roughnesses from which one more order of the azimuth fades in, and from which it is needed as a whole.
-RATIOS = ((1.4, 1.8), (4.0, 5.0), (8.0, 10.0))
+RATIOS = ((1.6, 2.0), (4.5, 5.5), (9.0, 11.0))
 SQUARE = 1e-6  # of a right angle, within which two axes are at one
 ROOT = float(np.sqrt(2))
 
