@@ -82,6 +82,15 @@ def test_densities_of_reflected_samples_sum_to_one() -> None:
         assert found.eval_pdf(wi, wo)[1].mean() * 2 * pi == pytest.approx(1, abs=2e-3)
 
 
+def test_light_from_listed_directions_alone_is_that_of_the_material() -> None:
+    """To what is interpolated between directions."""
+    material = Material.of(Stack([Medium(sigma_s=0.9, sigma_a=0.1, g=0.7), METAL]))
+    model, wi, wo = named("velatura"), directions(0.8, 0 * TURN), directions(0.4, TURN)
+    found = model.lit(material, (wi[0][:1], wi[1][:1], wi[2][:1]))(np.zeros(len(TURN), int))
+    known = model.body(material, variance_kind(material), Context())
+    np.testing.assert_allclose(found.eval_pdf(wi, wo)[0], known.eval_pdf(wi, wo)[0], rtol=2e-3)
+
+
 def test_the_symmetric_form_is_reciprocal() -> None:
     found = body([Medium(sigma_s=0.9, sigma_a=0.1, g=0.7), METAL], "symmetric")
     there, back = directions(0.8, 0 * TURN), directions(0.3, TURN)

@@ -44,9 +44,9 @@ def test_values_of_slabs_are_those_of_disort(form: str) -> None:
     """Bounds are those of `benchmarks/slabs.py`, where all cases are."""
     some = [case for case in slab_radiances.cases() if case.medium.depth == 1 and case.medium.sigma_s == 0.9]
     reflected = np.array([slab_radiances.errors(case, form)[0] for case in some])
-    most = {"Rayleigh": 0.01, "g 0": 0.01, "g 0.5": 0.035, "g 0.8": 0.12, "g 0.9": 0.2}
+    most = {"Rayleigh": 0.01, "g 0": 0.01, "g 0.5": 0.02, "g 0.8": 0.11, "g 0.9": 0.18}
     assert np.all(reflected < [most[case.name] for case in some])
-    assert reflected.mean() < 0.05
+    assert reflected.mean() < 0.04
 
 
 def test_media_are_as_the_page_has_them() -> None:

@@ -293,7 +293,7 @@ class Solver:
     def lit(self, material: Material, wi: Direction) -> Lit:
         """The upper side of a material of NumPy's values, solved for light from directions wi, (M,) each, alone."""
         (layout, *_), upper = self.layouts([material]), sides(material)[0]
-        found = self._side(upper, layout, Listed(self.isotropic, wi))
+        found = replace(self, apart=layout.top is not None)._side(upper, layout, Listed(self.isotropic, wi))
         return Lit(self._in_numpy(upper, found, layout, None), found.columns, wi)
 
     def _side(self, material: Material, layout: Layout, folded: Folded | Listed) -> SolvedSide:
@@ -337,6 +337,7 @@ class Solver:
             widths.nearly_straight,
             samples=self.normals or (FINELY[0] if self.finely else SAMPLES),
             like=layout.indices,
+            events=self.apart and layout.top is not None,
         )
         albedos = (solved.lobes.sum(axis=0) + solved.veils.sum(axis=0) + solved.rest)[:, folded.count :]
         light, own, others = solved.remainder, None, []

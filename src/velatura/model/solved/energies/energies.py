@@ -88,13 +88,14 @@ def energies(
     incidences: Array = INCIDENCES,
     samples: int = SAMPLES,
     like: Sequence[float] | None = None,
+    events: bool = False,
 ) -> Energies:
     """Energies for beams at cosines and azimuths (M,).
 
     `material` has NumPy's values. With the tables of multiple scattering facets are met often; `forward` is what goes
     into veils. The remainder is known at the cosines `incidences`, (I,); without
     any, lobes are all that is worked out, which is quicker. `samples` are normals for light from each node, and of each
-    beam; as many nodes are taken as for media of indices `like` those of the material.
+    beam; as many nodes are taken as for media of indices `like` those of the material; `events` as of `Setting`.
     """
     everything = _ended(parts(material))
     brushed = [(facets.ratio, facets.rotation) for facets in interfaces(everything) if facets.alpha_u != facets.alpha_v]
@@ -104,7 +105,7 @@ def energies(
     nodes = Nodes.of(indices(everything), NODES, like)
     orders = tuple(range(MODES if len(incidences) else 1))
     basis: Basis = Even.of(nodes, brushed) if brushed else Relative(nodes, orders)
-    setting = Setting(basis, np.sqrt(np.maximum(1 - cosines * cosines, 0)), around, samples, often)
+    setting = Setting(basis, np.sqrt(np.maximum(1 - cosines * cosines, 0)), around, samples, often, events)
 
     # Sum up the systems
     scatters = any(isinstance(part, Slab) and part.tau_s.any() for part in everything)
@@ -137,7 +138,7 @@ def energies(
     rest = np.maximum(reflected - (lobes + veils).sum(axis=0), 0)
     count = np.size(cos_theta)
     if brushed and len(incidences):
-        by_node = _of_isotropic(material, rest[:, count:], often, forward, incidences, samples, like)
+        by_node = _of_isotropic(material, rest[:, count:], often, forward, incidences, samples, like, events)
     elif len(incidences):
         in_lobes = zip(places, taken[:, :, None, None])
         by_node = tuple(light[..., count:] for light in _by_node(full, sharp, kept, whole, in_lobes))

@@ -34,7 +34,8 @@ RESOLVED = 50.0  # ratio of two roughnesses beyond which modes do not keep light
 @dataclass(frozen=True)
 class Setting:
     """How light is described: its basis, beams of momenta of length p at azimuths phi (M,), and how finely facets are
-    sampled. With the tables of multiple scattering facets are met often, else once.
+    sampled. With the tables of multiple scattering facets are met often, else once. `events` says that the shape of
+    light in media counts, not its energies alone.
     """
 
     basis: Basis
@@ -42,6 +43,7 @@ class Setting:
     phi: Array
     samples: int
     often: Tables | None = None
+    events: bool = False
 
     @property
     def ways(self) -> list[bool]:
@@ -51,7 +53,7 @@ class Setting:
     @property
     def key(self) -> Hashable:
         """All that it is."""
-        return self.basis, self.samples, self.often, self.p.tobytes(), self.phi.tobytes()
+        return self.basis, self.samples, self.often, self.events, self.p.tobytes(), self.phi.tobytes()
 
     def kept(self, key: Hashable, make: Callable[[], T]) -> T:
         """What is made of light in this basis, but for the ends of its nodes, once for all of one key."""

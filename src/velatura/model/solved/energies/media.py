@@ -29,8 +29,9 @@ Array = NDArray[np.floating]
 Straight = Callable[[PhaseFunction], float]  # share of scattered light that counts as going straight on
 
 THIN = 1e-4  # depth of the first layer, which scatters once at most: errors go as this depth
-EVENTS = 1000
-EVEN = 0.25  # of the events, in all directions alike, where few are drawn by a phase function with a peak
+EVENTS = 600
+FINE_EVENTS = 2500  # where the shape of light counts, and of these
+EVEN = 0.25  # in all directions alike, where few are drawn by a phase function with a peak
 HORIZON = 0.005  # cosine of directions that lie on both sides in part
 
 
@@ -105,14 +106,16 @@ def _kept(slab: Slab, depth: Array, p: Array) -> Array:
 def _scattered(slab: Slab, p: Array, psi: Array, setting: Setting) -> tuple[Array, ...]:
     """Light that is scattered up, and down, of light of one unit that travels down, (1, modes, N, S); kept for other
     media."""
-    key = _scattered, slab.n, slab.phase.key, p.tobytes(), psi.tobytes(), setting.basis.nodes.ends
-    lattice = _lattice(slab.phase)
+    key = _scattered, slab.n, slab.phase.key, setting.events, p.tobytes(), psi.tobytes(), setting.basis.nodes.ends
+    lattice = _lattice(slab.phase, setting.events)
     return tuple(setting.kept(key, lambda: setting.basis.deposited(_events, p, psi, lattice, [slab.n])[0]))
 
 
-def _lattice(phase: PhaseFunction) -> tuple[Array, Array, Array]:
+def _lattice(phase: PhaseFunction, finely: bool) -> tuple[Array, Array, Array]:
     """Cosines and azimuths, in turns, of events of a phase function, and the share of light of each."""
-    u_1, u_2 = fibonacci(EVENTS)
+    u_1, u_2 = fibonacci(FINE_EVENTS if finely else EVENTS)
+    if not finely:
+        return phase.sample(u_1), u_2, np.full(len(u_1), 1 / len(u_1))
     drawn = u_1 < 1 - EVEN
     cosine = np.where(drawn, phase.sample(np.minimum(u_1 / (1 - EVEN), BELOW_ONE)), 2 * (u_1 - 1 + EVEN) / EVEN - 1)
     density = phase.density(cosine)
@@ -141,7 +144,7 @@ def escaped(phase: PhaseFunction, depth: Array, basis: Basis, p: Array) -> Array
     """Light (C, modes, N, S) that a medium of an optical depth (C,) scatters back once by a phase function, without
     loss in an event, of one unit from outside of momenta p (S,)."""
     numbers = [*depth.tolist()]
-    return basis.deposited(_escapes, p, np.zeros_like(p), _lattice(phase), numbers)[0][0]
+    return basis.deposited(_escapes, p, np.zeros_like(p), _lattice(phase, True), numbers)[0][0]
 
 
 def _escapes(
