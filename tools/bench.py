@@ -38,6 +38,7 @@ COMMANDS = {
     "fit": ["--cases 16 --seed 41"],
     "inverse": ["", "--parts films --seed 1", "--parts physical rough --models bati2021 --physical 500 --seed 1"],
     "laws": ["", "--random 500"],
+    "metals": ["--walks 400000"],
     "render": ["", "--solids"],
     "shader": ["--language all", "--textured"],
 }
@@ -49,6 +50,7 @@ SMOKE = {
     "diffuse": "--stacks 1 --paths 1000",
     "interfaces": "--rounds 2 --most 2 --spp 1 --size 8 --count 64",
     "memory": "--rounds 1 --steps import",
+    "metals": "--metals Cu --coats 2",
     "models": "--rounds 2 --spp 1 --size 8 --models bati2021",
     "preparation": "--rounds 2 --presets bare-gold --kinds isotropic",
     "reference": "--part statistics --paths 1000",

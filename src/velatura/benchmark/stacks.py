@@ -33,7 +33,7 @@ LEAST_INDEX = 1.3  # of solids that are lit from inside
 DIGITS = 4
 
 COLOURS = ("eta", "k", "sigma_a", "sigma_s", "albedo")
-HELD = ("kind", "coating")  # no values
+HELD = ("kind", "coating", "measured")  # no values
 
 # Kinds ---------------------------------------------------------------------------------------------------------------
 

@@ -13,7 +13,7 @@ from velatura.binding import properties as properties_of
 from velatura.binding.textures import Range
 from velatura.errors import InvalidInput
 from velatura.films.textured import UNKNOWN, Span, constant_films
-from velatura.stack import Address, Material
+from velatura.stack import Address, Material, MeasuredIndex
 
 #: Wavelengths (nm) that stand for all light where all colours share one number, as one refracted direction: each for a
 #: quarter of the mean of the three curves that make sRGB of a spectrum under D65.
@@ -35,6 +35,7 @@ class Binding:
         constants: the same, within the ranges of their parameters.
         images: textures, spectra and fields by flat name.
         ranges: what these give, by flat name; None where that is known on a shape only.
+        metals: of every layer, the index over wavelength that its eta and k are colours of; None where they are not.
         steering: colours of those that are the same everywhere, at `STEERING_NM`; in spectral variants.
 
     Raises:
@@ -53,6 +54,8 @@ class Binding:
         self.steering: dict[str, Any] = {}
         self.clamped: set[str] = set()
         self.coatings: Sequence[Any] = ()
+        self.metals: Sequence[MeasuredIndex | None] = ()
+        self._measured = self._of_measured_metals()
         self.update()
 
     @property
@@ -69,6 +72,15 @@ class Binding:
     def interferes(self) -> bool:
         """Whether films change what is reflected from wavelength to wavelength of a ray."""
         return self.mi.is_spectral and any(self.stack.films)
+
+    def _of_measured_metals(self) -> dict[int, tuple[MeasuredIndex, dict[str, list[float]]]]:
+        """The metals that were measured, by layer, with their colours by flat name; none where these are spectra."""
+        found = {}
+        for k, index in enumerate(self.stack.measured):
+            names = [f"layer{k}_{part}" for part in ("eta", "k")]
+            if index and self.parameters.keys() >= set(names):
+                found[k] = index, {name: kernel.numbers(self.parameters[name]) for name in names}
+        return found
 
     # Values, after any has changed
 
@@ -88,7 +100,7 @@ class Binding:
         within = {name: self._within_range(name, value) for name, value in self.parameters.items()}
         self.constants = {name: self._shared(value) for name, value in within.items()}
         dr.make_opaque(self.constants)  # a changed value needs no new kernel
-        self.coatings = self._coatings()
+        self.coatings, self.metals = self._coatings(), self._metals()
         if self.mi.is_spectral:
             si = self._interaction_at_fixed_wavelengths(dr.zeros(self.mi.SurfaceInteraction3f))
             flat = [name for name, image in self.images.items() if image.colour and not image.varies]
@@ -142,6 +154,17 @@ class Binding:
         some = {**dict.fromkeys(self.images, 0.0), **self._colours()}
         return constant_films(Material.from_flat(self.stack, some, self._light), spans, number)
 
+    def _metals(self) -> Sequence[MeasuredIndex | None]:
+        """The measured index of each layer, while its colours are as they were at first, and not differentiated."""
+        import drjit as dr
+
+        found: list[MeasuredIndex | None] = [None] * len(self.stack.layers)
+        for k, (index, first) in self._measured.items():
+            now = {name: self.parameters[name] for name in first}
+            changed = any(dr.grad_enabled(value) or kernel.numbers(value) != first[name] for name, value in now.items())
+            found[k] = None if changed else index
+        return found
+
     def _range(self, address: Address, unknown: Mapping[str, tuple[float, float]]) -> Range:
         """The range of a texture, or that of its role where it is `unknown`, as of meshes."""
         channels = len(self.mi.UnpolarizedSpectrum()) if self.images[address.name].colour else 1
@@ -166,7 +189,7 @@ class Binding:
     def material(self, values: Mapping[str, Any], wavelengths_nm: Any = None) -> Material:
         """The material with these values by flat name; at the fixed wavelengths in spectral variants, unless given."""
         light = self._light if wavelengths_nm is None else wavelengths_nm
-        return Material.from_flat(self.stack, values, light).coated(self.coatings)
+        return Material.from_flat(self.stack, values, light).coated(self.coatings).of_metals(self.metals)
 
     def value(self, name: str, si: Any, active: Any) -> Any:
         """The value of a flat name at a surface point."""

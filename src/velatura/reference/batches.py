@@ -74,14 +74,16 @@ def _part(layers: WalkedLayers, wi: Array, count: int, seed: int, start: int, po
     # Walk
     rng = types.PCG32(count, types.UInt64(seed), types.UInt64(start))
     x, y, z = (dr.opaque(types.Float, float(component)) for component in wi)
-    path = walk(types, layers, (x, y, z), rng, types.Array3f(1), max_depth=MAX_DEPTH, polarised=polarised)
+    one = layers.start(types.Array3f(1))
+    path = walk(types, layers, (x, y, z), rng, one, max_depth=MAX_DEPTH, polarised=polarised)
     # Look at the ends
-    cut_off = dr.select(path.alive, dr.mean(path.weight), 0)
-    weight = dr.select(path.alive, 0, path.weight)
+    carried = dr.select(path.alive, 0, path.weight)
+    weight = layers.seen(carried, types.Array3f)
+    cut_off = dr.mean(layers.seen(path.weight, types.Array3f) - weight)
     parts = []
     if path.light is not None:
         light = path.light.along(path.w, horizontal(path.w))
-        parts = [weight * part for part in (light.q, light.u, light.v)]
+        parts = [layers.seen(carried * part, types.Array3f) for part in (light.q, light.u, light.v)]
     dr.eval(path.w, weight, path.deepest, cut_off, parts)
     w = np.stack([component.numpy() for component in path.w])
     stokes = np.stack([part.numpy() for part in parts]) if parts else None
@@ -105,7 +107,7 @@ def _layers(stack: Stack, microsurface: bool) -> WalkedLayers:
         dr.make_opaque(value)
         return value
 
-    return from_material(plain.each(opaque), microsurface)
+    return from_material(types, plain.each(opaque), microsurface)
 
 
 def _plain(address: Address, value: Any) -> float | RGB:

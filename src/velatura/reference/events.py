@@ -17,6 +17,7 @@ from velatura.optics import ggx, refraction
 from velatura.optics.ggx import Direction
 from velatura.optics.polarisation import Polarisation, unpolarised
 from velatura.reference.layers import WalkedLayers, WalkedSurface, relative_index
+from velatura.reference.metal import mean
 
 HUGE = 1e15  # products of densities stay finite
 
@@ -99,7 +100,7 @@ def sample_refraction(meeting: SurfaceMeeting, u1: Value, u2: Value) -> Scatteri
     weight = ops.select(o[2] < 0, transmittance * surface.masking(o), 0.0)
     density, back = _densities(surface, i, h, o, eta)
     density = ops.select(surface.smooth, 1.0, density)
-    back = ops.select(surface.smooth, _spread(o, i, 1 / eta), back) * ops.mean(transmittance)
+    back = ops.select(surface.smooth, _spread(o, i, 1 / eta), back) * mean(transmittance)
     return ScatteringEvent(surface.out_of(o), weight, False, density, back)
 
 
@@ -112,7 +113,7 @@ def _sample_interface(meeting: SurfaceMeeting, carried: Value, u1: Value, u2: Va
     light = meeting.light and meeting.light.seen_by(surface.into)
     sides = meeting.n_in, meeting.n_out, meeting.above
     (reflectance, passing), mirrored, refracted = meeting.layers.meet(meeting.j, i, h, *sides, light)
-    chance = ops.divide(ops.mean(carried * reflectance), ops.mean(carried * (reflectance + passing)))
+    chance = ops.divide(mean(carried * reflectance), mean(carried * (reflectance + passing)))
     chance = ops.select(meeting.opaque, 1.0, chance)
     reflected = u3 < chance
     o = ops.select_record(reflected, ggx.reflect(i, h), refraction.refract(i, h, eta))
@@ -121,7 +122,7 @@ def _sample_interface(meeting: SurfaceMeeting, carried: Value, u1: Value, u2: Va
     weight = ops.divide(share, ops.select(reflected, chance, 1 - chance)) * surface.masking(o)
     weight = ops.select(_same(o[2] > 0, reflected), weight, 0.0)
     density, back = _densities(surface, i, h, o, ops.select(reflected, 1.0, eta))
-    density = ops.select(surface.smooth, _spread(i, o, eta), density) * ops.mean(share)
+    density = ops.select(surface.smooth, _spread(i, o, eta), density) * mean(share)
     light = ops.select_record(reflected, mirrored, refracted)
     light = light and light.seen_by(surface.out_of)
     return ScatteringEvent(surface.out_of(o), weight, reflected, density, ops.select(surface.smooth, 1.0, back), light)
@@ -138,7 +139,7 @@ def _evaluate_interface(meeting: SurfaceMeeting, wo: Direction, reflected: Value
     share = ops.select(reflected, *meeting.shares(ops.maximum(cos_i, 0.0)))
     density, back = _densities(surface, i, h, o, eta)
     density = ops.select(serves, density, 0.0)
-    return ScatteringEvent(wo, share * density * surface.masking(o), reflected, density * ops.mean(share), back)
+    return ScatteringEvent(wo, share * density * surface.masking(o), reflected, density * mean(share), back)
 
 
 def _densities(surface: WalkedSurface, i: Direction, h: Direction, o: Direction, eta: Value) -> tuple[Value, Value]:

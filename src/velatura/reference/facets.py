@@ -16,6 +16,7 @@ from velatura.optics.ggx import Direction
 from velatura.optics.polarisation import Polarisation
 from velatura.reference import events
 from velatura.reference.events import ScatteringEvent, SurfaceMeeting
+from velatura.reference.metal import mean
 
 _MOST_EVENTS = 1000
 _FLOOR = 0.02  # density, per steradian
@@ -111,7 +112,7 @@ def _fly(types: Any, meeting: SurfaceMeeting, carried: Value, rng: Any, active: 
         sides = _sides(meeting, f.outside)
         (reflectance, passing), mirrored, refracted = meeting.layers.meet(meeting.j, i, h, *sides, f.light)
         kept = carried * f.weight
-        chance = ops.divide(ops.mean(kept * reflectance), ops.mean(kept * (reflectance + passing)))
+        chance = ops.divide(mean(kept * reflectance), mean(kept * (reflectance + passing)))
         chance = ops.select(meeting.opaque, 1.0, chance)
         reflected = f.rng.next_float32() < chance
         share = ops.select(reflected, reflectance / chance, ops.divide(passing, 1 - chance))

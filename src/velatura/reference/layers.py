@@ -12,7 +12,7 @@ from dataclasses import dataclass, replace
 from math import pi
 from typing import Any
 
-from velatura import ops
+from velatura import metals, ops
 from velatura.films.of_material import films_of
 from velatura.films.polarised import PolarisedFilms, polarised_films
 from velatura.films.reflectance import InterfaceFilms
@@ -23,6 +23,7 @@ from velatura.optics import fresnel, ggx
 from velatura.optics.ggx import Direction
 from velatura.optics.phase import PhaseFunction
 from velatura.optics.polarisation import Mueller, Polarisation, complement, mueller
+from velatura.reference.metal import WAVELENGTHS, WalkedMetal
 from velatura.stack import Address, BaseValues, InterfaceValues, Material, SlabValues, srgb_sensitivity
 from velatura.stack.chain import chain
 from velatura.stack.values import Pair
@@ -93,7 +94,8 @@ class WalkedLayers:
 
     With `microsurface`, light scatters many times between the facets of a surface. `films` are those on each surface,
     counted from below where the stack is `flipped`. Between media without an interface there is a smooth surface that
-    bends no light: `above` are the numbers of other surfaces above each slab.
+    bends no light: `above` are the numbers of other surfaces above each slab. Below which a `metal` of measured index
+    lies, paths carry light of its wavelengths.
     """
 
     base: str
@@ -106,6 +108,7 @@ class WalkedLayers:
     films: tuple[InterfaceFilms | None, ...] = ()
     flipped: Value = False
     above: tuple[int, ...] = ()
+    metal: WalkedMetal | None = None
 
     @property
     def count(self) -> int:
@@ -128,6 +131,14 @@ class WalkedLayers:
         )
         return replace(self, surfaces=surfaces, slabs=slabs, index=index, flipped=where)
 
+    def start(self, one: Value) -> Value:
+        """What a path carries at first, in place of a colour of ones."""
+        return self.metal.one if self.metal else one
+
+    def seen(self, carried: Value, kind: Any) -> Value:
+        """What a path carries as a colour of a renderer's type."""
+        return self.metal.seen(carried, kind) if self.metal else carried
+
     # Surfaces and slabs -----------------------------------------------------------------------------------------------
 
     def surface(self, j: Value) -> WalkedSurface:
@@ -147,6 +158,8 @@ class WalkedLayers:
         """
         if self.base == "mirror":
             base: Value = 1.0
+        elif self.metal:
+            base = self.metal.reflectance(cosine, n_in)
         elif self.base == "conductor" and self.films[-1]:
             base = self.films[-1].at(cosine, n_in)
         elif self.base == "conductor":
@@ -164,6 +177,8 @@ class WalkedLayers:
             reflected, passing = (self._of_interface(column, j) for column in zip(*each))
         if base is None:
             return reflected, passing
+        if self.metal:
+            reflected, passing = self.metal.wide(reflected), self.metal.wide(passing)
         is_base = self.is_base(j)
         return ops.select(is_base, base, reflected), ops.select(is_base, 0.0, passing)
 
@@ -198,6 +213,11 @@ class WalkedLayers:
             reflection, refraction = (self._of_interface(column, j) for column in zip(*each))
         if self.base == "mirror":
             base = Mueller(1.0, 1.0, -1.0, 0.0)
+        elif self.metal:
+            base = mueller(*self.metal.amplitudes(cosine, n_in))
+            reflection, refraction = (
+                Mueller(*map(self.metal.wide, vars(x).values())) for x in (reflection, refraction)
+            )
         elif self.base == "conductor" and (films := self.films[-1]):
             base = _polarised(films).opaque(cosine, n_in)
         elif self.base == "conductor":
@@ -231,8 +251,8 @@ class WalkedLayers:
         return shares, reflection.applied(light), refraction.applied(light)
 
 
-def from_material(material: Material, microsurface: bool) -> WalkedLayers:
-    """The layers of a material, in numbers and colours of any dialect."""
+def from_material(types: Any, material: Material, microsurface: bool) -> WalkedLayers:
+    """The layers of a material, in numbers and colours of any dialect; `types` is a module of the dialect's types."""
     surfaces: list[WalkedSurface] = []
     slabs: list[WalkedSlab] = []
     index: list[Value] = [material.exterior]
@@ -255,6 +275,13 @@ def from_material(material: Material, microsurface: bool) -> WalkedLayers:
             medium = None
         above.append(above[-1] + (medium is None))
     extinction = last.k if isinstance(last, InterfaceValues) and last.k is not None else 0.0
+    spectrum, metal = metals.of(material, WAVELENGTHS), None
+    if spectrum:
+        metal = WalkedMetal(types, spectrum)
+        slabs = [
+            replace(slab, absorption=metal.wide(slab.absorption), scattering=metal.wide(slab.scattering))
+            for slab in slabs
+        ]
     return WalkedLayers(
         "diffuse" if isinstance(last, BaseValues) else last.kind,
         tuple(surfaces),
@@ -265,6 +292,7 @@ def from_material(material: Material, microsurface: bool) -> WalkedLayers:
         microsurface,
         tuple(films),
         above=tuple(above),
+        metal=metal,
     )
 
 

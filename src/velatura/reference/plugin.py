@@ -7,11 +7,12 @@ from typing import Any
 
 import numpy as np
 
-from velatura import kernel
+from velatura import kernel, metals
 from velatura.binding import Binding, plugin_class
 from velatura.errors import InvalidInput
 from velatura.reference import proxy
 from velatura.reference.layers import ALPHA_MIN, WalkedLayers, from_material, relative_index, zeros
+from velatura.reference.metal import WAVELENGTHS
 from velatura.reference.next_event import way_out
 from velatura.reference.walk import Path, walk
 from velatura.stack import InterfaceValues, LayerValues
@@ -22,6 +23,9 @@ _MAX_DEPTH = 1000
 #: anything lossless where light that meets a second facet of an interface is lost.
 EXCEPTIONS = frozenset({"normalisation", "chi-square", "weights"})
 LOSS = frozenset({"lossless"})
+#: Light that has met a measured metal often may lie outside sRGB: then a channel of an estimate is negative; and where
+#: the metal itself does, a channel is more than all light.
+OUTSIDE, GAIN = frozenset({"finite"}), frozenset({"energy"})
 
 
 @kernel.plugin("layered_reference")
@@ -60,7 +64,6 @@ def make(mi: Any) -> type:
             self.seed = _integer("seed", chosen["seed"], 0, 2**32 - 1)
             self.max_depth = _integer("max_depth", chosen["max_depth"], 1, 10**6)
             self.microsurface = _switch("microsurface", chosen["microsurface"])
-            self.exceptions = EXCEPTIONS if self.microsurface else EXCEPTIONS | LOSS
             self.binding = Binding(mi, properties, set(options))
             self._update()
 
@@ -76,6 +79,10 @@ def make(mi: Any) -> type:
             peaks = {name: float(np.max(np.abs(np.array(value)))) for name, value in binding.constants.items()}
             seen = binding.material({**peaks, **binding.images})
             self.zeros = zeros(seen)
+            metal = metals.of(seen, WAVELENGTHS)
+            self.exceptions = EXCEPTIONS if self.microsurface else EXCEPTIONS | LOSS
+            if metal:
+                self.exceptions |= OUTSIDE | GAIN if metal.exceeds else OUTSIDE
             # An interface whose roughness varies may be smooth here and rough there
             widest = [_widest(seen.layers[k]) for k in seen.surfaces]
             scatters = any(layer.spreads for k, layer in enumerate(seen.layers) if k not in seen.surfaces)
@@ -105,7 +112,7 @@ def make(mi: Any) -> type:
             """The layers at a point, seen from below where `flipped`."""
             material = self.binding.at(si, active)
             material = material.each(lambda address, value: 0.0 if address in self.zeros else value)
-            layers = from_material(material, self.microsurface)
+            layers = from_material(mi, material, self.microsurface)
             return layers.reversed(flipped) if self.transmits else layers
 
         def _stream(self, *numbers: Any) -> Any:
@@ -125,7 +132,9 @@ def make(mi: Any) -> type:
             layers = self._layers(si, active, flipped)
             rng = self._stream(sample1, sample2.x, sample2.y, wi.x, wi.y, si.p.x, si.p.y, si.p.z)
             seen = (wi.x, wi.y, dr.abs(wi.z))
-            path = walk(mi, layers, seen, rng, mi.UnpolarizedSpectrum(1), active, self.max_depth)
+            one = layers.start(mi.UnpolarizedSpectrum(1))
+            path = walk(mi, layers, seen, rng, one, active, self.max_depth)
+            weight = layers.seen(path.weight, mi.UnpolarizedSpectrum)
             # Describe how it ended
             reflected = path.w[2] > 0
             bs = mi.BSDFSample3f()
@@ -135,8 +144,8 @@ def make(mi: Any) -> type:
             bs.sampled_component, bs.sampled_type, asked = self._drawn(ctx, reflected, path)
             passed = active & (path.alive ^ True) & asked
             if ctx.mode == mi.TransportMode.Radiance:
-                path.weight /= bs.eta * bs.eta
-            return bs, mi.depolarizer(dr.select(passed, path.weight, 0))
+                weight /= bs.eta * bs.eta
+            return bs, mi.depolarizer(dr.select(passed, weight, 0))
 
         def eval(self, ctx: Any, si: Any, wo: Any, active: Any = True) -> Any:
             # Walk towards the upper side, by which light leaves
@@ -147,13 +156,14 @@ def make(mi: Any) -> type:
             rng = self._stream(wi.x, wi.y, wo.x, wo.y, si.p.x, si.p.y, si.p.z, si.uv.x, si.uv.y, wo.z)
             out, rng = way_out(mi, layers, (wo.x, wo.y, dr.abs(wo.z)), rng)
             seen = (wi.x, wi.y, dr.select(flipped, -wi.z, wi.z))
-            one = mi.UnpolarizedSpectrum(1)
+            one = layers.start(mi.UnpolarizedSpectrum(1))
             path = walk(mi, layers, seen, rng, one, active, self.max_depth, out, self._painted(ctx))
+            value = layers.seen(path.value, mi.UnpolarizedSpectrum)
             # Turn energy into radiance
             if self.transmits and ctx.mode == mi.TransportMode.Radiance:
                 scale = dr.select(seen[2] > 0, 1.0, relative_index(layers.index[0], layers.index[-1]))
-                path.value *= scale * scale
-            return mi.depolarizer(dr.select(active, path.value, 0))
+                value *= scale * scale
+            return mi.depolarizer(dr.select(active, value, 0))
 
         def pdf(self, ctx: Any, si: Any, wo: Any, active: Any = True) -> Any:
             flipped = si.wi.z < 0

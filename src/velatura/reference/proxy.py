@@ -15,6 +15,7 @@ from velatura.ops import Value
 from velatura.optics import fresnel
 from velatura.optics.ggx import Direction, normalize
 from velatura.reference.layers import WalkedLayers, WalkedSurface
+from velatura.reference.metal import mean
 
 _FAINTEST = 0.05  # share of light that may go anywhere
 _NARROWEST = 1e-6  # alpha^2
@@ -57,13 +58,13 @@ def density(layers: WalkedLayers, wi: Direction, wo: Direction) -> Value:
     for k, surface in enumerate(layers.surfaces):
         # Lose light in the medium
         slab = layers.slabs[k]
-        left = left * ops.mean(slab.absorbed(1.0))
-        spread = spread + left * (1 - ops.mean(ops.exp(-slab.scattering)))
+        left = left * mean(slab.absorbed(1.0))
+        spread = spread + left * (1 - mean(ops.exp(-slab.scattering)))
         if k == layers.count - 1 and layers.base == "diffuse":
             spread = spread + left
             break
         # Reflect
-        reflectance = ops.mean(layers.shares(k, cosine, layers.index[k], layers.index[k + 1], True)[0])
+        reflectance = mean(layers.shares(k, cosine, layers.index[k], layers.index[k + 1], True)[0])
         smooth = smooth & surface.smooth
         reflected = ops.select(smooth, 0.0, left * reflectance)
         energy += reflected

@@ -20,6 +20,7 @@ from velatura.reference import events, facets
 from velatura.reference.events import SurfaceMeeting
 from velatura.reference.facets import UP
 from velatura.reference.layers import WalkedLayers, pick
+from velatura.reference.metal import mean
 from velatura.reference.next_event import WayOut, connect_medium, connect_surface, way_up
 
 ROULETTE = 0.25  # a path that carries less than this survives by chance, and carries this then
@@ -176,7 +177,7 @@ def _scatter(types: Any, layers: WalkedLayers, path: Path, out: WayOut | None, p
 
 def _roulette(path: Path) -> None:
     """End faint paths by chance, and make up for it in the others."""
-    carried = ops.mean(path.weight)
+    carried = mean(path.weight)
     survival = ops.minimum(carried / ROULETTE, 1.0)
     survives = path.rng.next_float32() < survival
     path.weight = ops.select(survives, ops.divide(path.weight, survival), 0.0)
@@ -197,7 +198,7 @@ def _travel(layers: WalkedLayers, path: Path) -> None:
         length = ops.minimum(flight, ahead)
         path.height += ops.select(down, length, -length) * cosine
         seen = ops.exp(-slab.scattering * length) * ops.select(path.inside, slab.scattering, 1.0)
-        path.weight *= ops.divide(seen, ops.divide(ops.mean(path.weight * seen), ops.mean(path.weight)))
+        path.weight *= ops.divide(seen, ops.divide(mean(path.weight * seen), mean(path.weight)))
     else:
         length = 1 / cosine
     path.weight *= slab.absorbed(length)

@@ -22,6 +22,7 @@ from velatura.stack.layers import (
 from velatura.stack.material import Material, as_described, number
 from velatura.stack.spectra import (
     Measured,
+    MeasuredIndex,
     Named,
     luminance_sensitivity,
     names,
@@ -50,6 +51,7 @@ __all__ = [
     "Material",
     "MaterialLike",
     "Measured",
+    "MeasuredIndex",
     "Medium",
     "MediumValues",
     "Named",

@@ -15,7 +15,7 @@ from pydantic import model_validator
 
 from velatura.stack.phases import Phase, PhaseRecord, WrittenPhase, asymmetry
 from velatura.stack.schema import Parameter, Record, parameters
-from velatura.stack.spectra import MIRROR, Named, names
+from velatura.stack.spectra import MIRROR, Measured, MeasuredIndex, Named, names
 from velatura.stack.values import (
     INDEX_HIGH,
     INDEX_LOW,
@@ -52,7 +52,8 @@ class FilmValues:
 class InterfaceValues:
     """A dielectric, a conductor or a mirror: GGX roughness along two axes, turned by `rotation` (degrees), and absolute
     indices of the medium below; a mirror has none, and a dielectric no extinction `k`. Thin films are listed from the
-    top; `coating` is their reflectance as a renderer has it, None where it follows from the values.
+    top; `coating` is their reflectance as a renderer has it, None where it follows from the values. `measured` is the
+    index over wavelength that `eta` and `k` are colours of, None where these are all that is known.
     """
 
     kind: Kind
@@ -63,6 +64,7 @@ class InterfaceValues:
     k: Any = None
     films: tuple[FilmValues, ...] = ()
     coating: Any = None
+    measured: MeasuredIndex | None = None
 
     @property
     def spreads(self) -> bool:
@@ -275,6 +277,14 @@ class Interface(LayerRecord):
                 assert isinstance(declared, Scalar)
                 values[film_key(k, key)] = declared.single(getattr(film, key))[0]
         return values
+
+    @property
+    def measured(self) -> MeasuredIndex | None:
+        """The index of a metal that was measured; None of one in numbers or under films, and of a dielectric."""
+        eta, k = (self.flat().get(key) for key in ("eta", "k"))
+        if self.films or not (isinstance(eta, Measured) and isinstance(k, Measured)):
+            return None
+        return MeasuredIndex(eta, k)
 
     @property
     def lossless(self) -> bool:

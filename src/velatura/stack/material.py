@@ -13,6 +13,7 @@ from typing import Any, TypeAlias
 from velatura.stack.flat_names import Address, addresses
 from velatura.stack.layers import KINDS, FilmValues, InterfaceValues, Kind, LayerValues, SlabValues, transmits
 from velatura.stack.phases import WrittenPhase
+from velatura.stack.spectra import MeasuredIndex
 from velatura.stack.stack import Stack
 
 Value: TypeAlias = Any
@@ -51,7 +52,8 @@ class Material:
     @classmethod
     def of(cls, stack: Stack, value: Callable[[Address, Any], Value] = number) -> Material:
         """The values of a stack, each as `value` converts it: in NumPy unless given."""
-        return cls.from_flat(stack, {address.name: value(address, described) for address, described in stack.values()})
+        flat = {address.name: value(address, described) for address, described in stack.values()}
+        return cls.from_flat(stack, flat).of_metals(stack.measured)
 
     @classmethod
     def from_flat(cls, like: Stack | Material, values: Mapping[str, Value], light: Value = "srgb") -> Material:
@@ -80,20 +82,36 @@ class Material:
     def each(self, change: Callable[[Address, Value], Value]) -> Material:
         """The material with every value changed."""
         changed = {address.name: change(address, value) for address, value in self.values()}
-        return self.from_flat(self, changed, self.light).coated(self.coatings)
+        return self.from_flat(self, changed, self.light).coated(self.coatings).of_metals(self.measured)
 
     def coated(self, coatings: Sequence[Any]) -> Material:
         """The material with films on its layers as a renderer has them, None for those without."""
-        if not any(coatings) and not any(self.coatings):
-            return self
-        pairs = zip(self.layers, coatings)
-        layers = [replace(layer, coating=x) if isinstance(layer, InterfaceValues) else layer for layer, x in pairs]
-        return replace(self, layers=tuple(layers))
+        return self._with("coating", coatings)
+
+    def of_metals(self, measured: Sequence[MeasuredIndex | None]) -> Material:
+        """The material with layers whose indices are colours of what was measured, None for those of no such one."""
+        return self._with("measured", measured)
 
     @property
     def coatings(self) -> tuple[Any, ...]:
         """The films on each layer as a renderer has them."""
-        return tuple(layer.coating if isinstance(layer, InterfaceValues) else None for layer in self.layers)
+        return self._each("coating")
+
+    @property
+    def measured(self) -> tuple[MeasuredIndex | None, ...]:
+        """The measured index that those of each layer are colours of."""
+        return self._each("measured")
+
+    def _each(self, key: str) -> tuple[Any, ...]:
+        """What each layer has beside its values, None for those that are no interfaces."""
+        return tuple(getattr(layer, key) if isinstance(layer, InterfaceValues) else None for layer in self.layers)
+
+    def _with(self, key: str, each: Sequence[Any]) -> Material:
+        if not any(each) and not any(self._each(key)):
+            return self
+        pairs = zip(self.layers, each)
+        layers = [replace(layer, **{key: x}) if isinstance(layer, InterfaceValues) else layer for layer, x in pairs]
+        return replace(self, layers=tuple(layers))
 
     @property
     def films(self) -> tuple[int, ...]:
@@ -137,8 +155,10 @@ class Material:
         return self.exterior if self.thin else last.eta
 
     def with_layer(self, n: int, **values: Value) -> Material:
-        """The material with values of its n-th layer changed."""
+        """The material with values of its n-th layer changed; an index that is, was not measured."""
         layers = list(self.layers)
+        if self.measured[n] and not values.keys().isdisjoint(("eta", "k")):
+            values = {"measured": None, **values}
         layers[n] = replace(layers[n], **values)  # type: ignore[type-var]  # all kinds of values are dataclasses
         return replace(self, layers=tuple(layers))
 

@@ -83,6 +83,14 @@ class Named(Measured):
 
 
 @dataclass(frozen=True)
+class MeasuredIndex:
+    """The index eta + i k of a metal, of which both parts were measured over wavelength."""
+
+    eta: Measured
+    k: Measured
+
+
+@dataclass(frozen=True)
 class Dispersion:
     """Refractive index by Sellmeier's formula, n^2 = 1 + sum of b w^2 / (w^2 - c), wavelength w in micrometres.
 

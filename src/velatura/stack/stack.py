@@ -24,6 +24,7 @@ from velatura.stack.layers import (
 )
 from velatura.stack.phases import WrittenPhase
 from velatura.stack.schema import Record, show, unknown
+from velatura.stack.spectra import MeasuredIndex
 from velatura.stack.values import Flag, Text
 
 
@@ -81,6 +82,11 @@ class Stack(Record):
     def phases(self) -> tuple[WrittenPhase | None, ...]:
         """The phase function of every layer, where it is not written by its asymmetry."""
         return tuple(layer.phase if isinstance(layer, Medium) else None for layer in self.layers)
+
+    @property
+    def measured(self) -> tuple[MeasuredIndex | None, ...]:
+        """The index of the metal of every layer, where it was measured."""
+        return tuple(layer.measured if isinstance(layer, Interface) else None for layer in self.layers)
 
     @property
     def interfaces(self) -> tuple[Interface, ...]:

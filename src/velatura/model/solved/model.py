@@ -60,9 +60,14 @@ class SolvedModel(Model):
         return REFLECTANCES if key == "reflectance" else SWITCHES[key] if key == "form" else (getattr(self, key),)
 
     def body(self, material: Material, variance: type[Variance], context: Context) -> Body:
-        from velatura.model.solved import rotation_frame, solve
+        from velatura import metals
+        from velatura.model.solved import rotation_frame, smooth_metal, solve
+        from velatura.model.solved.energies.wavelengths import WAVELENGTHS
 
         if not _is_solved(material):
+            metal = metals.of(material, WAVELENGTHS)
+            if metal:
+                return smooth_metal.body(material, metal, self.pointwise, variance, context)
             return self.pointwise.body(material, variance, context)
         frame = rotation_frame.frame(material)
         return frame.turned(solve.solve(frame.back(material), self, frame.kind(variance), context), material)

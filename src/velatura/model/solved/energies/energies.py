@@ -32,6 +32,7 @@ from velatura.model.solved.energies.interfaces import Setting
 from velatura.model.solved.energies.media import Slab, Straight
 from velatura.model.solved.energies.modes import Basis, Even, Relative
 from velatura.model.solved.energies.nodes import Nodes
+from velatura.model.solved.energies.wavelengths import Colours
 from velatura.model.solved.guards import TINY
 from velatura.stack import InterfaceValues, LayerValues, Material
 from velatura.tables import Tables
@@ -97,7 +98,8 @@ def energies(
     any, lobes are all that is worked out, which is quicker. `samples` are normals for light from each node, and of each
     beam; as many nodes are taken as for media of indices `like` those of the material; `events` as of `Setting`.
     """
-    everything = _ended(parts(material))
+    colours = Colours.of(material)
+    everything = colours.at_wavelengths(_ended(parts(material)))
     brushed = [(facets.ratio, facets.rotation) for facets in interfaces(everything) if facets.alpha_u != facets.alpha_v]
     azimuths = AZIMUTHS if brushed else AZIMUTHS[:1]
     cosines = np.concatenate([cos_theta, np.tile(incidences, len(azimuths))])
@@ -110,12 +112,13 @@ def energies(
     # Sum up the systems
     scatters = any(isinstance(part, Slab) and part.tau_s.any() for part in everything)
     each = layers(everything, setting)
-    full = Leaving.of([last for _, last in each], setting)
+    full = Leaving.of(colours.layers([last for _, last in each]), setting)
 
     def system(found: Sequence[Part], as_set: bool = False) -> Leaving:
         of = settings(found, setting)
         met = zip(found, of, each)
-        return Leaving.of([layer(x, y)[0] if isinstance(x, Slab) else of_it[as_set] for x, y, of_it in met], setting)
+        made = [layer(x, y)[0] if isinstance(x, Slab) else of_it[as_set] for x, y, of_it in met]
+        return Leaving.of(colours.layers(made), setting)
 
     clear = _ended(parts(material, lambda _: 0.0))
     sharp = system(clear) if scatters or often else full
@@ -136,21 +139,26 @@ def energies(
     share = np.minimum(reflected / np.maximum(veiled.sum(axis=0), TINY), 1)
     lobes, veils = unscattered * share, np.maximum(veiled - unscattered, 0) * share
     rest = np.maximum(reflected - (lobes + veils).sum(axis=0), 0)
+    lobes, veils, rest = colours.parts_seen(lobes, veils, rest)
     count = np.size(cos_theta)
     if brushed and len(incidences):
         by_node = _of_isotropic(material, rest[:, count:], often, forward, incidences, samples, like, events)
     elif len(incidences):
         in_lobes = zip(places, taken[:, :, None, None])
-        by_node = tuple(light[..., count:] for light in _by_node(full, sharp, kept, whole, in_lobes))
+        lights = _by_node(full, sharp, kept, whole, in_lobes)
+        by_node = tuple(colours.seen(light[..., count:]) for light in lights)
     else:
         by_node = (np.zeros((1, 1, nodes.count, 0)),) * 3
+    straight, through, passed = map(
+        colours.seen, (sharp.energies.straight, sharp.energies.passed, full.energies.passed)
+    )
     return Energies(
         lobes=lobes[..., :count],
         veils=veils[..., :count],
         rest=rest[:, :count],
-        straight=sharp.energies.straight[:, :count],
-        bounced=np.maximum(sharp.energies.passed - sharp.energies.straight, 0)[:, :count],
-        passed=np.maximum(full.energies.passed, 0)[:, :count],
+        straight=straight[:, :count],
+        bounced=np.maximum(through - straight, 0)[:, :count],
+        passed=np.maximum(passed, 0)[:, :count],
         remainder=by_node[0],
         around=by_node[1],
         again=by_node[2],

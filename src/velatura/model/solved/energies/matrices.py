@@ -41,6 +41,12 @@ class Blocks:
     def rows(self) -> int:
         return self.count * self.width
 
+    def __len__(self) -> int:
+        return len(self.values)
+
+    def __getitem__(self, colours: NDArray[np.integer]) -> Blocks:
+        return Blocks(self.values[colours])
+
     def wider(self, width: int) -> Blocks:
         """The same matrix, of wider blocks."""
         if self.width == width:

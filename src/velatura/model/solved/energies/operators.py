@@ -49,6 +49,12 @@ class Operator:
         """An operator that leaves nothing in a beam."""
         return cls(nodes, columns, np.zeros((1, 1, 1, columns.shape[-1])))
 
+    def of_colours(self, which: NDArray[np.integer]) -> Operator:
+        """The operator for colours of these numbers, where it is not the same for all."""
+        nodes = self.nodes if len(self.nodes) == 1 else self.nodes[which]
+        columns, beams = (x if len(x) == 1 else x[which] for x in (self.columns, self.beams))
+        return Operator(nodes, columns, beams)
+
     @property
     def light(self) -> Operator:
         """What becomes of beams alone."""
