@@ -45,6 +45,7 @@ EXAMPLES = (
     "brushed",
     "textured",
     "glass",
+    "phases",
     "polarised",
     "inverse",
     "fit",
