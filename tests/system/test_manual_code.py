@@ -54,7 +54,7 @@ ELSEWHERE = {
     "make test": "it runs this test",
     "pip install": "it installs",
     "python benchmarks/fuzz.py": "it takes hours; tests/system/test_random_inputs.py runs a part",
-    "python benchmarks/validation.py": "it takes a minute; tests/unit/test_validation.py runs a part",
+    "python benchmarks/validation.py": "it takes two minutes; tests/unit/test_validation.py runs a part",
     "velatura benchmark truth": "it takes hours; tests/unit/test_benchmark.py walks through a part",
     "velatura edit --static": "it takes minutes; tests/browser/test_offline.py writes a part",
 }

@@ -282,6 +282,8 @@ def test_scores_are_kept(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Non
     assert again.summary() == timed.summary()
     with pytest.raises(vt.InvalidInput, match="other kinds"):
         benchmark.kept_score(place, factory, "mine", ["films"])
+    with pytest.raises(vt.InvalidInput, match="other kinds"):
+        benchmark.kept_score(place, factory, "mine", ["glaze"], edition=2)
     good = json.loads(place.read_text())
     for text in (
         "{}",

@@ -177,7 +177,7 @@ def kept_score(
         except ValidationError as error:
             at, why = error.errors()[0]["loc"], error.errors()[0]["msg"]
             raise InvalidInput(f"{path}: holds no scores: {'.'.join(map(str, at))}: {why}") from None
-        if set(found.asked) != {case.kind for case in chosen(kinds, edition)}:
+        if found.edition != edition or set(found.asked) != {case.kind for case in chosen(kinds, edition)}:
             raise InvalidInput(f"{path}: holds scores of other kinds of stacks; give another folder")
         if found.cost is not None or not timed:
             return found
