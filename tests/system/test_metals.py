@@ -97,13 +97,21 @@ def test_a_smooth_stack_reflects_the_spectrum() -> None:
 
 
 def test_a_texture_above_a_metal_leaves_its_spectrum() -> None:
-    """Expected: albedos within .005 of those of the uniform roughness, which is the same at every texel."""
+    """Expected: albedos within .005 of those of the uniform roughness, which is the same at every texel; again so once
+    an index has been differentiated."""
     texture = {"type": "bitmap", "bitmap": mi.Bitmap(np.full((2, 2, 1), 0.2, np.float32)), "raw": True}
     varying = {"type": "bitmap", "bitmap": mi.Bitmap(np.float32([[[0.2], [0.2]], [[0.2], [0.3]]])), "raw": True}
     expected = albedo(vt.bsdf(COATED.replace(layer0_alpha=0.2)), 0.7, 20_000)
     for given in (texture, varying):
         bsdf = mi.load_dict({"type": "layered", "material": dumps(COATED, "json"), "layer0_alpha": given})
         np.testing.assert_allclose(albedo(bsdf, 0.7, 20_000), expected, atol=5e-3)
+    parameters = mi.traverse(bsdf)
+    dr.enable_grad(parameters["layer1_k"])
+    parameters.update()
+    assert np.abs(albedo(bsdf, 0.7, 20_000) - expected).max() > 0.02
+    dr.disable_grad(parameters["layer1_k"])
+    parameters.update()
+    np.testing.assert_allclose(albedo(bsdf, 0.7, 20_000), expected, atol=5e-3)
 
 
 def test_in_one_channel_it_has_the_luminance_of_its_colours() -> None:

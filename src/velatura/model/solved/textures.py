@@ -241,6 +241,7 @@ def _tabulated(
     solver = replace(solver, grid=grid, shape=SHAPES[isotropic], samples=SAMPLES)
     textures = {name for axis in spanned for name in axis.changed(axis.middle)}
     fixed = b"".join(np.asarray(x).tobytes() for address, x in start.values() if address.name not in textures)
+    fixed += bytes(map(bool, start.measured))
     given = Variables.of(material)
     if isinstance(before, TextureTables) and not given.given and before.holds(solver, spanned, fixed):
         return before
