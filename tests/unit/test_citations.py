@@ -93,6 +93,7 @@ MODEL = {
     8: ("remainder", {"lobes/remainder"}),
     9: ("direct transmission", {"transmission/direct"}),
     10: ("diffuse transmission", {"transmission/internal_reflections"}),
+    11: ("medium on top", {"lobes/top_medium"}),
 }
 
 

@@ -31,6 +31,10 @@ PER_PEAK = 40  # and for each peak
 MOST_ROWS = 4096  # of a table that is written out
 
 
+#: A number that is the same at all points, without gradients.
+number = functools.partial(Scalar, texturable=False, differentiable=False)
+
+
 class PhaseRecord(Record):
     """A phase function that is written with keys."""
 
@@ -45,41 +49,9 @@ class TwoLobes(PhaseRecord):
 
     holds = "forward, backward and share"
 
-    forward: Annotated[
-        float,
-        Scalar(
-            "asymmetry of one lobe",
-            low=-1,
-            high=1,
-            strict=True,
-            texturable=False,
-            differentiable=False,
-            typical=0.8,
-        ),
-    ]
-    backward: Annotated[
-        float,
-        Scalar(
-            "asymmetry of the other lobe",
-            low=-1,
-            high=1,
-            strict=True,
-            texturable=False,
-            differentiable=False,
-            typical=-0.3,
-        ),
-    ]
-    share: Annotated[
-        float,
-        Scalar(
-            "share of scattered light in the forward lobe",
-            low=0,
-            high=1,
-            texturable=False,
-            differentiable=False,
-            typical=0.8,
-        ),
-    ]
+    forward: Annotated[float, number("asymmetry of one lobe", low=-1, high=1, strict=True, typical=0.8)]
+    backward: Annotated[float, number("asymmetry of the other lobe", low=-1, high=1, strict=True, typical=-0.3)]
+    share: Annotated[float, number("share of scattered light in the forward lobe", low=0, high=1, typical=0.8)]
 
     @property
     def asymmetry(self) -> float:
@@ -103,8 +75,8 @@ class Rows(Parameter):
     """A table: a file, or its rows of an angle and a value."""
 
     what = f"a file, or a list of 2 to {MOST_ROWS} rows [angle, value]"
-    angle = Scalar("angle", low=0, high=180, texturable=False)
-    value = Scalar("value", low=0, texturable=False)
+    angle = number("angle", low=0, high=180)
+    value = number("value", low=0)
 
     def check(self, value: Any) -> Path | tuple[tuple[float, float], ...]:
         value = value.tolist() if hasattr(value, "tolist") else value
@@ -175,56 +147,19 @@ class Mie(TabulatedPhase):
 
     holds = "eta, and radius_um or size"
 
-    eta: Annotated[
-        float,
-        Scalar(
-            "absolute index of refraction of the spheres",
-            low=0.01,
-            high=100,
-            texturable=False,
-            differentiable=False,
-            typical=1.5,
-        ),
-    ]
-    k: Annotated[
-        float,
-        Scalar("absolute extinction of the spheres", low=0, high=100, texturable=False, differentiable=False),
-    ] = 0.0
-    radius_um: Annotated[
-        float | None,
-        Scalar("radius", unit="micrometres", low=0, texturable=False, differentiable=False, typical=0.5),
-    ] = None
+    eta: Annotated[float, number("absolute index of refraction of the spheres", low=0.01, high=100, typical=1.5)]
+    k: Annotated[float, number("absolute extinction of the spheres", low=0, high=100)] = 0.0
+    radius_um: Annotated[float | None, number("radius", unit="micrometres", low=0, typical=0.5)] = None
     size: Annotated[
         float | None,
-        Scalar(
+        number(
             "size parameter, circumference over the wavelength in the medium, in place of radius_um",
             low=SIZES[0],
             high=SIZES[1],
-            texturable=False,
-            differentiable=False,
         ),
     ] = None
-    medium: Annotated[
-        float,
-        Scalar(
-            "absolute index of refraction of the medium around them",
-            low=0.01,
-            high=100,
-            texturable=False,
-            differentiable=False,
-        ),
-    ] = 1.0
-    wavelength_nm: Annotated[
-        float,
-        Scalar(
-            "wavelength outside, for all colours",
-            unit="nm",
-            low=100,
-            high=1e5,
-            texturable=False,
-            differentiable=False,
-        ),
-    ] = 550.0
+    medium: Annotated[float, number("absolute index of refraction of the medium around them", low=0.01, high=100)] = 1.0
+    wavelength_nm: Annotated[float, number("wavelength outside, for all colours", unit="nm", low=100, high=1e5)] = 550.0
 
     @model_validator(mode="after")
     def _one_size(self) -> Mie:

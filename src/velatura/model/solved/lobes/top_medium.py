@@ -1,7 +1,7 @@
 """Light that a medium scatters back where nothing above it refracts much: fog, dust, matt paint.
 
 Of a homogeneous medium of optical depth tau and albedo a, with cosines z_i and z_o and the angle Theta between the
-directions of travel, light that is scattered once is reflected as (Chandrasekhar 1960, section 47)
+directions of travel, light that is scattered once is reflected as (Chandrasekhar 1960)
 
     f = a p(cos Theta) (1 - exp(-tau (1 / z_i + 1 / z_o))) / (z_i + z_o).
 
@@ -68,7 +68,7 @@ class TopMedium(ops.NamedFields):
         scattered = self.albedo * self.phase.density(cosine)
         for share, phase in zip(self.shares, self.wider):
             scattered = scattered + share * phase.density(cosine)
-        return scattered * escaping(self.depth, wi[2], wo[2])
+        return scattered * escaping(self.depth, wi[2], wo[2])  # model.md, Eq. 11
 
     def chance(self, wi: Direction) -> Value:
         """Share of samples that are drawn by phase functions."""
