@@ -324,6 +324,23 @@ WALKED: dict[str, list[Any]] = {
 }
 
 
+@pytest.mark.parametrize(
+    "coats",
+    [
+        [Interface(eta=1.5, alpha=[0.26, 0.03], rotation=77), Interface(eta=1.35, alpha=[0.19, 0.03], rotation=30)],
+        [Interface(eta=1.3, alpha=[0.2, 0.02], rotation=61), Interface(eta=1.5, alpha=[0.26, 0.08], rotation=164)],
+    ],
+)
+def test_light_that_passes_crossed_brushings_agrees_with_walks(coats: list[Interface]) -> None:
+    """At a slant, where facets of the coats are met most often."""
+    stack, cosines = Stack([*coats, Interface(eta=1.9, k=4.5, alpha=[0.3, 0.045], rotation=85)]), np.array([0.1])
+    walked = vt.reference.statistics(stack, cosines, paths=200_000, seed=3, microsurface=True)
+    assert walked.standard_error
+    true, error = np.sum(walked.energy, axis=0), np.square(walked.standard_error.energy).sum(axis=0)
+    bound = MODEL_ERROR * true + FALSE_ALARM_SIGMAS * np.sqrt(error)
+    assert (np.abs(reflected(solved(stack, cosines=cosines)) - true) < bound).all()
+
+
 @pytest.mark.parametrize("often", [False, True], ids=["once", "often"])
 @pytest.mark.parametrize("name", WALKED)
 def test_energies_agree_with_walks(name: str, often: bool) -> None:

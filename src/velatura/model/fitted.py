@@ -11,7 +11,7 @@ OPAQUE_STEP = 1.4  # step of the logarithm of the index that turns as much as a 
 BRUSHED_FROM = (
     0.3  # difference of two roughnesses, as share of the larger, from which light keeps its momentum along facets
 )
-PASSED_ON = 0.5  # share of repeated light that passes brushed facets in the directions of second events
+PASSED_ON = 0.75  # share of repeated light that passes brushed facets in the directions of second events
 BLOCKED = (0.004, 0.014)  # shares of blocked light below which, and above which, its share comes from the tables
 BLOCKED_IN_THE_END = (0.9, 0.15)  # share of little blocked light that is reflected, towards a rarer medium and a denser
 # Step of the logarithm of the index that refracted light which meets further facets still passes, where these are met

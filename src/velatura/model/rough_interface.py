@@ -229,7 +229,8 @@ class FirstEvents:
 
     `ways` says whether masking is correlated with the height of facets, as what follows needs (Heitz et al. 2016);
     otherwise it is separable. With `again`, there is also the light of second events, of what the last way blocks: what
-    is reflected twice, and unless facets are opaque what then passes, and what was refracted at first.
+    is reflected twice, and unless facets are opaque what then passes; and of what was refracted at first, what is
+    reflected back inside, and what leaves.
     """
 
     facets: Facets
@@ -243,9 +244,9 @@ class FirstEvents:
 
     @property
     def lights(self) -> int:
-        """How many lights there are: of second events also what was refracted at first."""
+        """How many lights there are: each outcome of each first one, of second events."""
         first = self.facets.outcomes
-        return first + (2 * first - 1 if self.again else 0)
+        return first + (first * first if self.again else 0)
 
     def numbers(self, samples: int) -> list[Any]:
         """All numbers, and films, as `__call__` reads them."""
@@ -300,9 +301,11 @@ class FirstEvents:
             lights.append(Light(below * x, below * y, [t * share * each for each in through for t in passing]))
             others += [t * share * (1 - through[-1]) for t in passing]
             if self.again:
-                # More facets that turn it there and back leave it as it was
-                on = [ops.select(z < 0, each, 0.0) for each in others[len(passing) :]]
-                again.append(Light(below * x, below * y, on))
+                # What meets facets from below is seen upside down
+                inside = [ops.select(z < 0, each, 0.0) for each in others[len(passing) :]]
+                turned = below, alpha_u, alpha_v, 0.0, 1 / eta, 0.0, 0.0, *(1 / index for index in colours), None
+                from_below = replace(self, facets=self.facets.reversed())
+                again += from_below._second((x, y, -1 * z), inside, u_2 / share, turned)[0]
         return [*lights, *again], [*others, blocked * share, *twice]
 
     def _second(

@@ -180,7 +180,8 @@ class _Met:
         shares = FirstShares.beside(facets, totals, others)
         lights, second = lights[: facets.outcomes], lights[facets.outcomes :]
         if len(second) > 1:
-            second = [second[0], second[1] + second[2]]
+            # Light that is reflected inside passes
+            second = [second[0] + second[3], second[1] + second[2]]
         return cls(lights[0], None if facets.opaque or facets.final else lights[1], shares, tuple(second))
 
     def _of_some(self, sources: slice | NDArray[np.integer]) -> _Met:
