@@ -49,7 +49,7 @@ Array = NDArray[np.floating]
 
 RGB = 3
 NORMALS = {True: 1597, False: 987}  # over which lobes are integrated, of isotropic materials and of others
-MANY = 4  # interfaces, beyond which each meets fewer samples
+MANY = 4  # interfaces or lobes, beyond which each has fewer samples
 FINELY = 1597, 4181  # facets, and as NORMALS, for differences, whose error is that of values over a step
 BETWEEN = {True: 144, False: 89}  # as NORMALS, for each place of a renderer's grid
 NARROW = 0.05  # roughness of lobes whose integrals have edges between directions, as those of interfaces do
@@ -57,7 +57,7 @@ EVENLY = 377  # directions over which the remainder is integrated, and four time
 BRIGHTEST = 4.0  # by how much it is scaled at most
 LITTLE = 0.05  # by which energies are scaled for their colour
 BRIGHTER = 1.5  # at most, where it takes light of lobes
-VEIL_MIN = 1e-3  # energy of veils that are drawn
+VEILS = 1e-3, 1e-2  # optical depth of what media scatter by little, from which veils are drawn, and from which whole
 MIN_DEFENSIVE_SHARE = 0.2  # of samples of the symmetric form, that the remainder and the rest of what passes have
 
 
@@ -226,7 +226,7 @@ class Solver:
         """Layouts of each side, valid for all `materials`."""
         veiled: set[int] = set()
         for material in materials:
-            veiled = veiled.union(*map(_veiled, sides(material)))
+            veiled = veiled.union(*map(_veils, sides(material)))
         return [layout_of(seen, veiled) for seen in zip(*map(sides, materials))]
 
     def solve(self, material: Material, layouts: Sequence[Layout]) -> list[SolvedSide]:
@@ -237,7 +237,7 @@ class Solver:
         found = [replace(each, columns=replace(each.columns, scale=0 * each.columns.scale + 1)) for each in found]
         numbers, folded = self.body(material, found, layouts), Folded.of(self.grid.coarser(material), material)
         factors, wanted = reciprocal_balance.factors(
-            numbers, folded.directions, folded.shares, folded.count, self.samples, _few(1.0, material)
+            numbers, folded.directions, folded.shares, folded.count, self.samples, _few(1.0, len(material.interfaces))
         )
 
         def spread(values: Array) -> Array:
@@ -302,7 +302,7 @@ class Solver:
         lobes = self._lobes(material, layout, folded, light)
         clipped, peak = _clipped(polynomial, top, folded.at_cosines)
         whole = polynomial.albedo(folded.cosine) + folded.around(clipped)
-        drawn, rest = self._hand_over(material, layout, folded, light, lobes, whole)
+        drawn, rest = self._hand_over(_in_veils(layout, material, light), folded, lobes, light.rest, whole)
         scale = _scale(rest, whole)
         wanted = [*(each.wanted for each in drawn), Demand.of(rest + ENERGY_EPS, rest, scale * folded.around(peak))]
         transmission = self.transmission(_uncoloured(material), layout)
@@ -368,23 +368,15 @@ class Solver:
         return [_Lobe(shape, tensor(spec)) for shape, spec in zip(shapes, layout.lobes)]
 
     def _hand_over(
-        self,
-        material: Material,
-        layout: Layout,
-        folded: Folded | Listed,
-        light: Energies,
-        lobes: Sequence[_Lobe],
-        whole: Array,
+        self, energies: Sequence[Array], folded: Folded | Listed, lobes: Sequence[_Lobe], rest: Array, whole: Array
     ) -> tuple[list[_Weighed], Array]:
         """Divide energies of lobes by their integrals; the remainder takes what light it can, by which a lobe would be
         too bright, and has the energy that is returned. `whole` is its albedo without a scale."""
-        rest, drawn, apart = light.rest, [], {each.interface for each in layout.lobes if each.veil}
-        normals = self.normals or (FINELY[1] if self.finely else round(_few(NORMALS[self.isotropic], material)))
-        for (shape, tensor), spec in zip(lobes, layout.lobes):
+        drawn = []
+        normals = self.normals or (FINELY[1] if self.finely else round(_few(NORMALS[self.isotropic], len(lobes))))
+        for (shape, tensor), own in zip(lobes, energies):
             lobe = shape.lobe(1.0, tensor.roughness(folded.phi))
             z, squares, largest = refracted_lobe.integrals(lobe, folded.directions, normals)
-            k = spec.interface
-            own = light.veils[k] if spec.veil else light.lobes[k] + (0 if k in apart else light.veils[k])
             more = np.clip(own - combined.MAX_GAIN * z, 0, np.maximum(BRIGHTER * whole - rest, 0))
             rest = rest + more
             energy = own - more
@@ -624,9 +616,9 @@ def sides(material: Material) -> list[Material]:
     return [material, material.reversed()] if material.transmits else [material]
 
 
-def _few(samples: float, material: Material) -> float:
-    """Count of samples, less where a stack has many interfaces, so that its time stays bounded."""
-    return samples * min(1.0, MANY / max(len(material.interfaces), 1))
+def _few(samples: float, parts: int) -> float:
+    """Count of samples of each part, less where a stack has many, so that its time stays bounded."""
+    return samples * min(1.0, MANY / max(parts, 1))
 
 
 def _reflects_all(found: Sequence[Part]) -> bool:
@@ -699,19 +691,33 @@ def _scale(energy: Array, albedo: Array) -> Array:
     return np.clip(energy / np.maximum(albedo, ALBEDO_MIN), 0, BRIGHTEST)
 
 
-def _veiled(material: Material) -> set[int]:
-    """Interfaces below media that scatter light by little."""
-    veiled: set[int] = set()
-    above, k = False, 0
+def _in_veils(layout: Layout, material: Material, light: Energies) -> list[Array]:
+    """Energies of the lobes of a layout, (C, M) each: a lobe has what its veil has not."""
+    drawn, shares = {spec.interface for spec in layout.lobes if spec.veil}, _veils(material)
+
+    def own(spec: LobeSpec) -> Array:
+        share = shares.get(spec.interface, 0.0) if spec.interface in drawn else 0.0
+        if spec.veil:
+            return share * light.veils[spec.interface]
+        return light.lobes[spec.interface] + (1 - share) * light.veils[spec.interface]
+
+    return list(map(own, layout.lobes))
+
+
+def _veils(material: Material) -> dict[int, float]:
+    """Shares of light that media above scatter by little that are drawn as veils, by interface, where there are any."""
+    veils: dict[int, float] = {}
+    share, k = 0.0, 0
     for layer in material.layers:
         if isinstance(layer, SlabValues):
             slab = Slab.of(layer, 1.0, widths.nearly_straight)
             assert slab.straight is not None
-            above = above or bool(slab.straight * np.max(slab.tau_s) > VEIL_MIN)
+            events = slab.straight * float(np.max(layer.tau_s))
+            share = max(share, min((events - VEILS[0]) / (VEILS[1] - VEILS[0]), 1.0))
         elif isinstance(layer, InterfaceValues):
-            veiled |= {k} if above else set()
+            veils |= {k: share} if share > 0 else {}
             k += 1
-    return veiled
+    return veils
 
 
 def _evened(wanted: Demand) -> Demand:
