@@ -15,7 +15,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from velatura.optics import fresnel
-from velatura.stack import Material, MeasuredIndex, spectrum, srgb_weights
+from velatura.stack import InterfaceValues, Material, MeasuredIndex, spectrum, srgb_weights
+from velatura.stack.layers import is_zero
 from velatura.stack.spectra import LUMINANCE
 
 Array = NDArray[np.floating]
@@ -64,9 +65,13 @@ class MetalWavelengths:
 
 
 def of(material: Material, most: int) -> MetalWavelengths | None:
-    """The wavelengths of the metal that a material in channels of colours ends in; None where none was measured."""
-    index = material.measured[-1]
-    return wavelengths(index, material.light, most) if index and isinstance(material.light, str) else None
+    """The wavelengths of the metal that a material in channels of colours ends in; None where none was measured, or
+    films on it have their own colours."""
+    index, light, last = material.measured[-1], material.light, material.layers[-1]
+    if index is None or not isinstance(light, str) or not isinstance(last, InterfaceValues):
+        return None
+    bare = all(is_zero(film.thickness_nm) for film in last.films)
+    return wavelengths(index, light, most) if bare else None
 
 
 @functools.lru_cache(256)

@@ -110,13 +110,15 @@ def test_channels_that_differ_above_a_metal_keep_their_own() -> None:
 
 
 def test_films_above_a_metal_leave_its_spectrum() -> None:
-    """Expected: a film of next to no thickness changes nothing; a metal under films has its colours."""
+    """Expected: a film of next to no thickness changes nothing; a metal under films has its colours, unless these have
+    no thickness."""
     coat, metal = {"eta": 1.5, "alpha": 0.2}, vt.Interface(conductor="Au", alpha=0.3)
     filmed = vt.Interface(**coat, films=[vt.Film(eta=1.5, thickness_nm=1.0)])
     bare = reflected(Stack([vt.Interface(**coat), metal]))
     np.testing.assert_allclose(reflected(Stack([filmed, metal])), bare, rtol=0.01)
-    on_metal = vt.Interface(conductor="Au", alpha=0.3, films=[vt.Film(eta=1.5, thickness_nm=1.0)])
-    assert on_metal.measured is None
+    on_metal = Stack([vt.Interface(conductor="Au", alpha=0.3, films=[vt.Film(eta=1.5, thickness_nm=10.0)])])
+    assert metals.of(Material.of(on_metal), 2) is None
+    assert metals.of(Material.of(on_metal.replace(layer0_film0_thickness_nm=0)), 2)
 
 
 def test_a_colour_outside_srgb_is_bounded_to_all_light() -> None:

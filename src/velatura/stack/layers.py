@@ -280,11 +280,9 @@ class Interface(LayerRecord):
 
     @property
     def measured(self) -> MeasuredIndex | None:
-        """The index of a metal that was measured; None of one in numbers or under films, and of a dielectric."""
+        """The index of a metal that was measured; None of one in numbers, and of a dielectric."""
         eta, k = (self.flat().get(key) for key in ("eta", "k"))
-        if self.films or not (isinstance(eta, Measured) and isinstance(k, Measured)):
-            return None
-        return MeasuredIndex(eta, k)
+        return MeasuredIndex(eta, k) if isinstance(eta, Measured) and isinstance(k, Measured) else None
 
     @property
     def lossless(self) -> bool:
