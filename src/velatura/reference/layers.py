@@ -94,8 +94,8 @@ class WalkedLayers:
 
     With `microsurface`, light scatters many times between the facets of a surface. `films` are those on each surface,
     counted from below where the stack is `flipped`. Between media without an interface there is a smooth surface that
-    bends no light: `above` are the numbers of other surfaces above each slab. Below which a `metal` of measured index
-    lies, paths carry light of its wavelengths.
+    bends no light: `above` are the numbers of other surfaces above each slab. Where a `metal` of measured index lies
+    below, paths carry light of its wavelengths.
     """
 
     base: str

@@ -51,7 +51,8 @@ def make(mi: Any) -> type:
 
         `sample` walks, `eval` is an unbiased estimate, and `pdf` only resembles the density of `sample`: pictures
         converge to the truth, but the plugin fails a chi-square test. An interface whose roughness is below 1e-5 along
-        both axes is perfectly smooth. Not differentiable.
+        both axes is perfectly smooth. Not differentiable. In RGB variants, an estimate for a stack that ends in a metal
+        by name or by tables may have a negative channel, since light that has met it often lies outside sRGB.
 
         Components are light that met only smooth interfaces (delta), light that the diffuse base scattered (diffuse),
         and all other light (glossy), by side.

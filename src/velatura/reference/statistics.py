@@ -67,6 +67,8 @@ def statistics(
     otherwise the median of their sizes along each principal axis of the half-vectors' covariance. The half-vectors of
     transmitted light are those of its mirror image and of `wi` refracted through the whole stack (Belcour 2018, 4.2).
 
+    Light of a metal by name or by tables is walked at three wavelengths of each channel (docs/explanation/model.md).
+
     Args:
         stack: a material (a stack, a file, or a preset's name).
         cos_theta: cosines of the directions of incidence, in (0, 1]: a number, or a list of N.
