@@ -26,8 +26,16 @@ WALK = "walk"
 SYMMETRIC = "-symmetric"
 BAKED = ("principled", "openpbr")
 NAMES = (*(f"{model.name}{form}" for model in MODELS for form in ("", SYMMETRIC)), "weidlich_wilkie", *BAKED, WALK)
-#: Whose cost is measured: of the second edition, one that most can express of each sort.
-STACKS = ("car-paint-00", "brushed-under-lacquer-01", "glaze-00", "wet-asphalt-00")
+#: Whose cost is measured: of the second edition, opaque ones that are bare metal below, and others.
+STACKS = (
+    "anodised-aluminium-01",
+    "car-paint-00",
+    "brushed-under-lacquer-01",
+    "four-to-six-coats-00",
+    "large-steps-01",
+    "glaze-00",
+    "wet-asphalt-00",
+)
 YARDSTICK = "roughconductor"
 WARMING = 2  # changes that do not count, since they compile
 TO, FROM = np.array([[0.6, 0.0, 0.8]]), np.array([[-0.6, 0.0, 0.8]])
@@ -37,19 +45,20 @@ def compute(
     names: Sequence[str] = NAMES,
     kinds: Sequence[str] | None = None,
     stacks: Sequence[str] = STACKS,
-    rounds: int = 9,
-    lanes: int = 2**18,
+    rounds: int = 7,
+    lanes: int = evaluation.LANES,
     seed: int = 0,
     progress: Progress | None = None,
 ) -> dict[str, Any]:
     """Numbers of each entrant of the benchmark, by `name`: total `variation`, and its `noise`, of what it can express,
-    the `share` of all records that this is; `evaluation`, the median over stacks, None where it is no plugin, and
-    `change` in ms."""
+    the `share` of all records that this is; `evaluation`, the median over stacks, and `from` and `to` on them, None
+    where it is no plugin; and `change` in ms."""
     cases = [case for case in benchmark.edition(2) if case.id in stacks]
     costs = _evaluations(names, cases, rounds, lanes, seed)
     entrants = []
     for name in canvas.track(names, progress):
         summary = benchmark.score(benchmark.entrant(name), name, kinds, edition=2).summary()
+        found = costs.get(name)
         changes = [
             _change(name, case, 1 if name in BAKED else rounds) for case in cases if _made(name, case) is not None
         ]
@@ -59,7 +68,9 @@ def compute(
                 "variation": summary["variation"],
                 "noise": summary["floor"],
                 "share": summary["records"] / summary["asked"],
-                "evaluation": costs.get(name),
+                "evaluation": float(np.median(found)) if found else None,
+                "from": min(found) if found else None,
+                "to": max(found) if found else None,
                 "change": float(np.median(changes)),
             }
         )
@@ -74,8 +85,8 @@ def _made(name: str, case: Case) -> Candidate:
 
 def _evaluations(
     names: Sequence[str], cases: Sequence[Case], rounds: int, lanes: int, seed: int
-) -> Mapping[str, float]:
-    """The cost of `eval_pdf` over that of one lobe, of entrants that are plugins, the median over stacks."""
+) -> Mapping[str, list[float]]:
+    """The cost of `eval_pdf` over that of one lobe on each stack, of entrants that are plugins."""
     found: dict[str, list[float]] = {}
     for case in cases:
         plugins = {name: _made(name, case) for name in names}
@@ -85,7 +96,7 @@ def _evaluations(
         each = evaluation.costs({**bsdfs, YARDSTICK: lobe}, others, rounds, seed, lanes)["eval_pdf"]
         for name, cost in each.items():
             found.setdefault(name, []).append(cost["median"])
-    return {name: float(np.median(costs)) for name, costs in found.items()}
+    return found
 
 
 def _change(name: str, case: Case, rounds: int) -> float:
@@ -120,6 +131,8 @@ def draw(figure: Any, numbers: dict[str, Any]) -> None:
                 continue
             face = colour if each["share"] == 1 else "white"
             plot.plot(each[key], each["variation"], "o", color=colour, markerfacecolor=face, label=name)
+            if key == "evaluation":
+                plot.plot([each["from"], each["to"]], [each["variation"]] * 2, color=colour, linewidth=3, alpha=0.2)
             other = found.get(f"{name}{SYMMETRIC}")
             if other:
                 plot.plot(other[key], other["variation"], "s", color=colour)
@@ -133,7 +146,7 @@ def draw(figure: Any, numbers: dict[str, Any]) -> None:
     plots[1].set(xlabel="a changed stack until it is evaluated, ms of the processor")
     figure.legend(*plots[1].get_legend_handles_labels(), loc="outside right upper", fontsize="small")
     figure.suptitle(
-        "Circles: forward; squares: symmetric; open: some stacks cannot be expressed; "
-        "dotted: formulas, not timed; dashed: noise of the truth",
+        "Circles: forward; squares: symmetric; bars: from the cheapest to the dearest stack\n"
+        "open: some stacks cannot be expressed; dotted: formulas, not timed; dashed: noise of the truth",
         fontsize="small",
     )
