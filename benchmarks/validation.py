@@ -323,7 +323,7 @@ def write(folder: Path, found: dict[str, Any]) -> None:
     path = folder / f"{NAME}.json"
     numbers = (json.loads(path.read_text(encoding="utf-8")) if path.exists() else {}) | found
     with files.whole(path) as unfinished:
-        unfinished.write_text(json.dumps(_rounded(numbers), indent=1, allow_nan=False) + "\n", encoding="utf-8")
+        unfinished.write_text(json.dumps(_rounded(numbers), allow_nan=False) + "\n", encoding="utf-8")
     if numbers.keys() >= PARTS.keys():
         draw(numbers, folder / f"{NAME}.webp")
 
