@@ -48,7 +48,7 @@ def compute(
         images = {form: canvas.spheres(stack, MODEL, "studio", size, spp, seed, form=form) for form in FORMS}
         modelled: dict[str, Any] = {
             "model": lobes(stack, 1.0, model=MODEL, **canvas.CHOICES),
-            "walk": reference.statistics(stack, 1.0, 0.0, paths, seed),
+            "walk": reference.statistics(canvas.in_channels(stack), 1.0, 0.0, paths, seed),
         }
         cell: dict[str, Any] = {"name": f"{metal}, coat {coat:g}", "coat": float(coat), "metal": metal}
         cell["mean"] = {name: float(each.mean()) for name, each in [("reference", true), *images.items()]}

@@ -16,7 +16,7 @@ from velatura.checks.probe import Probe, ProbeSamples
 from velatura.comparison import check_figure
 from velatura.errors import needs
 from velatura.figures import Progress
-from velatura.stack import Stack, Texture
+from velatura.stack import Measured, Stack, Texture
 
 Array = NDArray[np.floating]
 Item = TypeVar("Item")
@@ -52,9 +52,15 @@ def track(items: Sequence[Item], progress: Progress | None) -> Iterator[Item]:
             progress(done, len(items))
 
 
+def in_channels(stack: Stack) -> Stack:
+    """The stack whose metals have one eta and k a channel, as those of the papers; walks would have their spectrum."""
+    indices = {address.name: address.plain(x, "") for address, x in stack.values() if isinstance(x, Measured)}
+    return stack.replace(**indices)
+
+
 def bsdf(stack: Stack, model: str, **switches: Any) -> Any:
-    """The BSDF of a model with the figures' choices, or a plugin, changed by switches."""
-    return api.bsdf(stack, model, **({} if model in api.PLUGINS else CHOICES) | switches)
+    """The BSDF of a model with the figures' choices, or a plugin, changed by switches; of a stack `in_channels`."""
+    return api.bsdf(in_channels(stack), model, **({} if model in api.PLUGINS else CHOICES) | switches)
 
 
 def spheres(stack: Stack, model: str, env: str, size: int, spp: int, seed: int, **switches: Any) -> Array:

@@ -111,7 +111,7 @@ def compute(
 
 
 def _last_lobe(stack: Stack, columns: Columns, paths: int, seed: int) -> dict[str, Any]:
-    true = _last(reference.statistics(stack, COSINES, 0.0, paths, seed))
+    true = _last(reference.statistics(canvas.in_channels(stack), COSINES, 0.0, paths, seed))
     modelled = {"walk": true}
     for title, (model, choices) in columns.items():
         modelled[title] = along(_last(lobes(stack, COSINES, 0.0, model, **choices)), true)
