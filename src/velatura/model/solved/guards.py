@@ -16,7 +16,7 @@ COS_IN_SLABS_MIN = 0.02  # of light that passes directly, and where it cannot en
 
 # Momenta, as lengths
 MOMENTUM_MIN = 1e-150  # that has an azimuth
-MOMENTUM_STEP_MIN = 1e-7  # at steep facets
+MOMENTUM_STEP_MIN = 3e-5  # at steep facets, whose cosines grow with its inverse
 MOMENTUM_WIDTH_MIN = 1e-4  # that an interface gives to light which it turns by itself
 MOMENTUM_WIDTH_ACROSS_MIN = 2e-5  # of it, across the brushing
 WIDTH2_MIN = 1e-12  # that decides the shares where no interface has any
