@@ -20,7 +20,7 @@ from velatura.inverse.local.dragged import DraggedStack
 from velatura.model import named
 from velatura.model.roughness_maps import MAPS
 from velatura.model.variance import Covariance, Roughness
-from velatura.stack import Interface, Medium, Stack, presets
+from velatura.stack import Interface, Medium, Named, Stack, presets, rgb
 
 pytestmark = pytest.mark.usefixtures("one_thread")
 
@@ -96,10 +96,14 @@ def test_a_material_is_read_and_found_again(model: str) -> None:
     ratio = np.array(target["lobes"][1]["energy"]) / target["lobes"][0]["energy"]
     assert haze["energy"] == pytest.approx(ratio)
     same = appearance.invert({"material": COATED, "target": target, "model": model})
+    assert deviation(same["material"], target, model) < 1e-6
     given, found = Stack.from_dict(COATED).flat(), Stack.from_dict(same["material"]).flat()
-    for key in ("layer0_eta", "layer0_alpha_u", "layer2_alpha_u"):
+    for key in ("layer0_eta", "layer0_alpha_u"):
         assert found[key] == pytest.approx(given[key], abs=1e-6)
-    assert found["layer2_eta"] == pytest.approx(vt.stack.rgb(given["layer2_eta"]), abs=1e-5)
+    # A metal by name becomes one in numbers, which has other colours in the default model
+    error = 0.01 if model == "velatura" else 1e-5
+    assert found["layer2_alpha_u"] == pytest.approx(given["layer2_alpha_u"], abs=0.1 * error)
+    assert found["layer2_eta"] == pytest.approx(vt.stack.rgb(given["layer2_eta"]), abs=error)
 
 
 @pytest.mark.parametrize("name", presets())
@@ -208,7 +212,7 @@ def test_answers_to_a_held_drag_are_approximate_and_exact_where_it_rests() -> No
         assert deviation(moved["material"], found["target"], "velatura") < (1e-3 if rough else EXACT)
 
 
-BRUSHED = {
+BRUSHED: dict[str, Any] = {
     "layers": [
         {"interface": {"eta": 1.5, "alpha": [0.05, 0.1], "rotation": -10}},
         {"medium": {"sigma_a": [0.1, 0.2, 0.3]}},
@@ -257,14 +261,20 @@ def test_a_round_lobe_becomes_brushed_and_its_class_stays() -> None:
     assert found["snapped"] is None and deviation(found["material"], wish, "weier2020") < EXACT
 
 
-def test_answers_to_held_drags_of_brushed_lobes_are_approximate() -> None:
-    """Small steps of `velatura` miss a hundredth of the variance, and turn by less than half a degree."""
-    here = appearance.appearance({"material": BRUSHED, "model": "velatura"})["target"]
+@pytest.mark.parametrize(("metal", "most"), [("numbers", 0.01), ("name", 0.02)])
+def test_answers_to_held_drags_of_brushed_lobes_are_approximate(metal: str, most: float) -> None:
+    """Small steps of `velatura` miss a hundredth of the variance, and turn by less than half a degree; a metal by name
+    becomes one in numbers, which costs another hundredth."""
+    brushed = copy.deepcopy(BRUSHED)
+    if metal == "numbers":
+        brushed["layers"][2]["interface"] |= {"eta": rgb(Named("Cu", "eta")), "k": rgb(Named("Cu", "k"))}
+        del brushed["layers"][2]["interface"]["conductor"]
+    here = appearance.appearance({"material": brushed, "model": "velatura"})["target"]
     for changes in ({"rotation": 132.0}, {"energy": [0.98 * e for e in here["lobes"][1]["energy"]]}):
         wish = copy.deepcopy(here)
         wish["lobes"][1] |= changes
-        answer = appearance.invert({"material": BRUSHED, "target": wish, "model": "velatura", "read": here})
-        assert answer["rough"] and deviation(answer["material"], wish, "velatura") < 0.01
+        answer = appearance.invert({"material": brushed, "target": wish, "model": "velatura", "read": here})
+        assert answer["rough"] and deviation(answer["material"], wish, "velatura") < most
 
 
 @pytest.mark.parametrize("model", MODELS)
