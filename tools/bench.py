@@ -47,6 +47,7 @@ FIRST = ("walks",)  # which others read
 SMOKE = {
     "bakes": "--presets bare-gold --targets gltf",
     "coat": "--sets absorbing",
+    "continuity": "--material 'smooth coat' --parameter layer1_alpha --steps 8",
     "diffuse": "--stacks 1 --paths 1000",
     "interfaces": "--rounds 2 --most 2 --spp 1 --size 8 --count 64",
     "memory": "--rounds 1 --steps import",
