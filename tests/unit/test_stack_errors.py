@@ -375,7 +375,7 @@ def test_errors_carry_their_exit_status() -> None:
 
 def test_values_are_counted_while_they_are_read(monkeypatch: pytest.MonkeyPatch) -> None:
     """Expected: a refusal although the text goes on, and is no YAML there."""
-    monkeypatch.setattr("velatura.stack.io._MOST", 10)
+    monkeypatch.setattr("velatura.stack.text._MOST", 10)
     with pytest.raises(InvalidInput, match=r"^material\.yaml: holds more than 10 values$"):
         loads("[" + "1, " * 20 + "{{{")
 

@@ -25,8 +25,8 @@ import yaml
 
 from velatura.errors import InvalidInput, needs
 from velatura.files import check_folder, reason
-from velatura.stack import io
 from velatura.stack.schema import show
+from velatura.stack.text import parsed
 from velatura.sweeps.plan import Plan, versions
 from velatura.sweeps.questions import NAMES, Array, meaning
 
@@ -208,7 +208,7 @@ def existing(path: Path, plan: Plan) -> Store | None:
         return None
     try:
         attributes = json.loads((path / ".zattrs").read_bytes())
-        before, made = dict(io.parsed(attributes["plan"], "yaml", path)), dict(attributes["versions"])
+        before, made = dict(parsed(attributes["plan"], "yaml", path)), dict(attributes["versions"])
         layout = {name: StoredVariable.read(fields) for name, fields in attributes["layout"].items()}
     except Exception:  # of any kind, by what is there
         raise InvalidInput(f"{path}: is there already, and holds no sweep") from None

@@ -22,8 +22,8 @@ from velatura.programs.imported import Imported, Notes, shown
 from velatura.programs.surface import INDICES
 from velatura.programs.values import changed
 from velatura.stack import Texture, loads
-from velatura.stack.io import parsed
 from velatura.stack.schema import show
+from velatura.stack.text import parsed
 
 LARGEST = 2**26  # characters of JSON
 _MAGIC, _JSON, _BINARY = b"glTF", b"JSON", b"BIN\0"
