@@ -1,7 +1,8 @@
 """A Sphinx extension: insert the program's own help and numbers into the manual, so that the two cannot disagree.
 
 `<!-- parameters -->` becomes the table of a material's parameters, `<!-- help VERB -->` the output of
-`velatura VERB --help`, `<!-- presets -->` a card for each preset.
+`velatura VERB --help`, `<!-- presets -->` a card for each preset, `<!-- substances -->` the table of the pages of
+refractiveindex.info that come with the package.
 
 `{{belcour2018-13: rmse/forward}}` becomes a number of `docs/figures/belcour2018-13.json`, which `make figures`
 computes. After the figure's name stand the keys that lead to the number; an item of a list has an index or its name. A
@@ -142,6 +143,7 @@ def replaced(markdown: str) -> str:
     """A page with its placeholders replaced."""
     markdown = re.sub(r"<!-- parameters -->", lambda _: _parameters(), markdown)
     markdown = re.sub(r"<!-- presets -->", lambda _: _presets(), markdown)
+    markdown = re.sub(r"<!-- substances -->", lambda _: _substances(), markdown)
     markdown = re.sub(r"<!-- table (.*?): (.*?) -->", lambda match: _table(*match.groups()), markdown)
     markdown = re.sub(r"\{\{(.*?)\}\}", lambda match: _number(match[1]), markdown)
     markdown = re.sub(r"\]\(((?:\.\./)*)examples/(\w+)\.py\)", r"](\1gallery/\2.rst)", markdown)
@@ -161,6 +163,17 @@ def _presets() -> str:
     distances = json.loads((DOCS / "reference" / "presets.json").read_text())
     cards = (_card(name, vt.preset(name), distances[name]) for name in vt.presets())
     return "\n".join(["::::{grid} 1 2 3 4", ":gutter: 3", "", *cards, "::::"])
+
+
+def _substances() -> str:
+    from velatura.cli.substances import pages
+
+    rows = ["| page | substance | range (nm) | metal | source |", "|---|---|---|---|---|"]
+    for row in pages():
+        low, high = row["range_nm"]
+        cells = (f"`{row['name']}`", row["substance"], f"{low:.0f} to {high:.0f}", row["colour"] or "", row["source"])
+        rows.append(f"| {' | '.join(cells)} |")
+    return "\n".join(rows)
 
 
 def _card(name: str, stack: Any, distance: dict[str, float]) -> str:

@@ -34,7 +34,20 @@ if TYPE_CHECKING:
     from velatura.exports import export
     from velatura.imports import from_gltf, from_openpbr, from_principled, from_standard_surface
     from velatura.model import MODELS, Model
-    from velatura.stack import Diffuse, Film, Interface, Medium, Spectrum, Stack, Texture, load, preset, presets, save
+    from velatura.stack import (
+        Diffuse,
+        Film,
+        Interface,
+        Medium,
+        Spectrum,
+        Stack,
+        Substance,
+        Texture,
+        load,
+        preset,
+        presets,
+        save,
+    )
     from velatura.sweeps import Axis, Space, sweep
 
 _HOMES = {
@@ -52,6 +65,7 @@ _HOMES = {
         "Medium",
         "Spectrum",
         "Stack",
+        "Substance",
         "Texture",
         "load",
         "preset",
@@ -78,6 +92,7 @@ __all__ = [
     "Space",
     "Spectrum",
     "Stack",
+    "Substance",
     "Texture",
     "VelaturaError",
     "bsdf",

@@ -51,8 +51,8 @@ VALUES = {
     one_layer("eta: .nan"): "layer 0 (interface): eta: must be finite, got nan",
     one_layer("eta: [1.5, .inf, 1]"): "layer 0 (interface): eta: must be finite, got inf",
     one_layer("eta: [1.5, 1]"): (
-        "layer 0 (interface): eta: must be a number, [r, g, b], a name, a spectrum or a texture, "
-        "and lie in 0.001 to 1e4, got [1.5, 1]"
+        "layer 0 (interface): eta: must be a number, [r, g, b], a name, a page of refractiveindex.info, "
+        "a spectrum or a texture, and lie in 0.001 to 1e4, got [1.5, 1]"
     ),
     one_layer(f"eta: 0x{'f' * 5000}"): "layer 0 (interface): eta: must be finite, got inf",
     one_layer("eta: 1, k: -1"): "layer 0 (interface): k: must lie in 0 to 1e4, got -1",
@@ -306,8 +306,8 @@ def test_a_path_that_cannot_be_written_gets_one_line(
         ({"layer2_conductor": "Gold"}, "layer 2 (interface): conductor: unknown metal 'Gold' (did you mean gold?)"),
         (
             {"layer2_eta": Named("Au", "k")},
-            "layer 2 (interface): eta: must be a number, [r, g, b], a name, a spectrum or a texture, "
-            "and lie in 0.001 to 1e4, got Named(name='Au', part='k')",
+            "layer 2 (interface): eta: must be a number, [r, g, b], a name, a page of refractiveindex.info, "
+            "a spectrum or a texture, and lie in 0.001 to 1e4, got Named(name='Au', part='k')",
         ),
         ({"thin": True}, "thin: only for a stack that ends in a dielectric interface"),
     ],

@@ -39,6 +39,7 @@ from velatura.cli import (
     render,
     schema,
     simplify,
+    substances,
     sweep,
     tables,
 )
@@ -74,6 +75,7 @@ for verb in (
     imports.import_,
     figure.figure,
     presets.presets,
+    substances.substances,
     schema.schema,
     tables.tables,
     cite.cite,

@@ -18,11 +18,12 @@ class CitationFormat(str, Enum):
 
 
 def cite(
-    models: Annotated[
+    used: Annotated[
         list[str] | None,
         typer.Argument(
-            metavar="[MODEL]...",
-            help=f"{options.MODELS}; reference, the walk; weidlich_wilkie, the baseline. Default: velatura.",
+            metavar="[MODEL|PAGE]...",
+            help=f"{options.MODELS}; reference, the walk; weidlich_wilkie, the baseline; or a page of "
+            "refractiveindex.info, as main/Au/Johnson. Default: velatura.",
         ),
     ] = None,
     form: Annotated[
@@ -31,9 +32,9 @@ def cite(
 ) -> None:
     """Print what to cite for a picture.
 
-    The papers of its models, Velatura itself in its version, and Mitsuba.
+    The papers of its models, the sources of its indices, Velatura itself in its version, and Mitsuba.
     """
     from velatura import citations
 
-    found = citations.entries(models or ()).values()
+    found = citations.entries(used or ()).values()
     print("\n\n".join(found) if form is CitationFormat.bibtex else "\n".join(map(citations.text, found)))

@@ -89,7 +89,12 @@ def tone_map(linear: ArrayLike, knee: float = 0.7) -> NDArray[np.float64]:
     x = np.maximum(np.nan_to_num(np.asarray(linear, dtype=np.float64)), 0.0)
     room = 1.0 - knee
     x = np.where(x > knee, 1.0 - room * np.exp(-np.maximum(x - knee, 0.0) / room), x)
-    return np.where(x <= 0.0031308, 12.92 * x, 1.055 * x ** (1.0 / 2.4) - 0.055)
+    return srgb_curve(x)
+
+
+def srgb_curve(linear: NDArray[np.floating]) -> NDArray[np.float64]:
+    """Display values of linear ones in [0, 1], by the curve of sRGB (IEC 61966-2-1)."""
+    return np.where(linear <= 0.0031308, 12.92 * linear, 1.055 * linear ** (1.0 / 2.4) - 0.055)
 
 
 def check_writable(path: Name) -> Path:

@@ -32,7 +32,7 @@ from velatura.stack.spectra import (
     srgb_weights,
 )
 from velatura.stack.stack import Stack
-from velatura.stack.values import RGB, Brushing, Film, Spectrum, Texture, Varying
+from velatura.stack.values import RGB, Brushing, Film, Spectrum, Substance, Texture, Varying
 
 __all__ = [
     "RGB",
@@ -58,6 +58,7 @@ __all__ = [
     "SlabValues",
     "Spectrum",
     "Stack",
+    "Substance",
     "Texture",
     "Value",
     "Varying",

@@ -8,7 +8,7 @@ from velatura.stack.layers import LAYERS
 from velatura.stack.phases import RECORDS
 from velatura.stack.schema import Parameter, Record, parameters
 from velatura.stack.stack import Stack
-from velatura.stack.values import Brushing, Film, Spectrum, Texture
+from velatura.stack.values import Brushing, Film, Spectrum, Substance, Texture
 
 
 def json_schema() -> dict[str, Any]:
@@ -23,6 +23,7 @@ def json_schema() -> dict[str, Any]:
         "required": ["layers"],
         "$defs": {
             "spectrum": {**_keys(Spectrum), "required": ["spectrum"]},
+            "substance": {**_keys(Substance), "required": ["refractiveindex"]},
             "texture": {**_keys(Texture), "required": ["texture"]},
             "brushing": {**_keys(Brushing), "required": ["brushing"]},
             "film": {**_keys(Film), "required": ["eta", "thickness_nm"]},
@@ -41,6 +42,7 @@ def parameter_table() -> str:
         "material": Stack,
         **LAYERS,
         "spectrum": Spectrum,
+        "substance": Substance,
         "texture": Texture,
         "brushing": Brushing,
         "film": Film,

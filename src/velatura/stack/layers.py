@@ -30,11 +30,12 @@ from velatura.stack.values import (
     Pair,
     Scalar,
     Spectrum,
+    Substance,
     Texture,
 )
 
 Kind: TypeAlias = Literal["dielectric", "conductor", "mirror", "medium", "diffuse"]
-Value: TypeAlias = float | RGB | Named | Spectrum | Texture | Brushing
+Value: TypeAlias = float | RGB | Named | Spectrum | Substance | Texture | Brushing
 
 # Values, in any dialect: floats, arrays, a renderer's numbers, recorded symbols --------------------------------------
 
@@ -208,7 +209,8 @@ class LayerRecord(Record):
 class Interface(LayerRecord):
     """A boundary to the medium below it.
 
-    It is a dielectric where `eta` stands alone, and opaque where `k` (even 0) or `conductor` is given.
+    It is a dielectric where `eta` stands alone, and opaque where `k` (even 0) or `conductor` is given. The page of a
+    metal in the refractiveindex.info database, as `eta` alone, gives both.
     """
 
     record = InterfaceValues
@@ -222,13 +224,13 @@ class Interface(LayerRecord):
     title = "interface"
 
     eta: Annotated[
-        float | RGB | str | Spectrum | Texture | None,
+        float | RGB | str | Spectrum | Substance | Texture | None,
         Index(
             "absolute index of refraction of the medium below", low=INDEX_LOW, high=INDEX_HIGH, part="eta", typical=1.5
         ),
     ] = None
     k: Annotated[
-        float | RGB | str | Spectrum | Texture | None,
+        float | RGB | str | Spectrum | Substance | Texture | None,
         Index(
             "absolute extinction of what lies below; written, even as 0, it makes it opaque",
             low=0,
@@ -260,6 +262,8 @@ class Interface(LayerRecord):
             raise ValueError("eta: missing; write eta, or eta and k, or conductor")
         if self.k is None and isinstance(self.eta, str) and self.eta in names()[0]:
             raise ValueError(f"eta: {self.eta} is a metal; write conductor: {self.eta}")
+        if self.k is None and self.conductor is None and isinstance(self.eta, Substance) and self.eta.opaque:
+            object.__setattr__(self, "k", parameters(Interface)["k"].check(self.eta))  # frozen from here on
         return self
 
     @property

@@ -14,19 +14,23 @@ from typing import Any
 
 from velatura.errors import InvalidInput
 from velatura.files import content, whole
+from velatura.stack import substances
 from velatura.stack.stack import Stack
 
-KEYS = ("texture", "spectrum", "table")  # of paths
+KEYS = ("texture", "spectrum", "table", "refractiveindex")  # of paths
 
 
 def rewritten(node: Any, rewrite: Callable[[str], str]) -> Any:
     """A copy of parsed values in which the path of every texture and table is rewritten."""
     if isinstance(node, dict):
         return {
-            key: rewrite(value) if key in KEYS and isinstance(value, str) else rewritten(value, rewrite)
-            for key, value in node.items()
+            key: rewrite(value) if _is_path(key, value) else rewritten(value, rewrite) for key, value in node.items()
         }
     return [rewritten(entry, rewrite) for entry in node] if isinstance(node, list) else node
+
+
+def _is_path(key: object, value: object) -> bool:
+    return key in KEYS and isinstance(value, str) and (key != "refractiveindex" or substances.is_path(value))
 
 
 def hold(data: bytes, name: str, ending: str) -> Path:

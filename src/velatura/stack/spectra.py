@@ -38,7 +38,8 @@ SRGB_FROM_XYZ = (  # ITU-R BT.709 primaries
     (0.055648, -0.204043, 1.057311),
 )
 
-_ALIASES = {
+#: Other names of materials.
+ALIASES = {
     "aluminium": "Al",
     "aluminum": "Al",
     "chromium": "Cr",
@@ -162,9 +163,27 @@ def names() -> tuple[tuple[str, ...], tuple[str, ...]]:
     crystals = {name for name in files if name.removesuffix("_palik") in _CRYSTALS}
     dielectrics = crystals | set(DISPERSIONS)
     metals = files - crystals
-    for alias, name in _ALIASES.items():
+    for alias, name in ALIASES.items():
         (metals if name in metals else dielectrics).add(alias)
     return tuple(sorted(metals)), tuple(sorted(dielectrics))
+
+
+@functools.cache
+def source(name: str) -> str:
+    """Where the spectrum of a material by name comes from, as far as its file states it.
+
+    Raises:
+        MissingTool: Mitsuba, whose wheel carries the data, is not installed.
+    """
+    name = ALIASES.get(name, name)
+    if name in DISPERSIONS:
+        return DISPERSIONS[name].source
+    with (_folder() / f"{name}.eta.spd").open(encoding="utf-8", errors="replace") as file:
+        comments = [line.strip("#; \t\r\n") for line in file if line.startswith("#")]
+    # Without the name of the collection, the rule, the heads of columns and words that lead over
+    stated = [line for line in comments if line.strip("-") and not line.endswith((":", "database", "n            k"))]
+    what, *where = (line.removeprefix("Optical constants for ") for line in stated)
+    return ", ".join([f"luxpop.com, as Mitsuba 3 carries it: {what}", *filter(None, [" ".join(where)])])
 
 
 @functools.cache
@@ -199,7 +218,7 @@ def read(path: Path) -> Table:
 def _by_name(named: Named) -> Table:
     import numpy as np
 
-    name = _ALIASES.get(named.name, named.name)
+    name = ALIASES.get(named.name, named.name)
     conductors, dielectrics = names()
     if name in DISPERSIONS and named.part == "eta":
         wavelengths_nm = np.arange(360.0, 831.0, 5.0)

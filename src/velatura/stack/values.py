@@ -14,9 +14,10 @@ from typing import Annotated, Any, ClassVar, Literal, TypeAlias
 
 from pydantic import PrivateAttr, model_validator
 
-from velatura.errors import within
+from velatura.errors import InvalidInput, within
+from velatura.stack import substances
 from velatura.stack.schema import Parameter, Record, parameters, show, unknown
-from velatura.stack.spectra import MIRROR, Measured, Named, Table, names, read, rgb
+from velatura.stack.spectra import MIRROR, Measured, Named, Table, names, read, rgb, source
 
 RGB: TypeAlias = tuple[float, float, float]
 
@@ -126,6 +127,23 @@ class File(Parameter):
         return {"type": "string"}
 
 
+class PageName(Parameter):
+    """A page of the refractiveindex.info database: shelf/book/page, or the path of its file."""
+
+    what = "shelf/book/page of refractiveindex.info, or the path of its YAML file"
+
+    def check(self, value: Any) -> str | Path:
+        if not isinstance(value, str | Path) or not _encodable(str(value)):
+            raise self.refuse(value)
+        if substances.is_path(value):
+            return File(self.doc).check(value)
+        substances.entry(str(value))
+        return str(value)
+
+    def json_schema(self) -> dict[str, Any]:
+        return {"type": "string", "examples": list(substances.names())}
+
+
 class Conductor(Parameter):
     """A metal by name, or the perfect mirror."""
 
@@ -134,6 +152,8 @@ class Conductor(Parameter):
     def check(self, value: Any) -> str | None:
         if value is None:
             return None
+        if isinstance(value, Mapping | Substance):
+            raise ValueError(f"must be {self.what}; or write eta: {{refractiveindex: shelf/book/page}}")
         if not isinstance(value, str):
             raise self.refuse(value)
         conductors, dielectrics = names()
@@ -144,7 +164,11 @@ class Conductor(Parameter):
         return value
 
     def json_schema(self) -> dict[str, Any]:
-        return {"enum": [MIRROR, *names()[0]]}
+        conductors = names()[0]
+        return {
+            "enum": [MIRROR, *conductors],
+            "enumDescriptions": ["reflects all light", *map(source, conductors)],  # as text editors show them
+        }
 
 
 def _encodable(text: str) -> bool:
@@ -296,13 +320,15 @@ class Colour(Scalar):
     def check(self, value: Any) -> Any:
         if self.texturable and isinstance(value, Mapping) and "spectrum" in value:
             value = Spectrum.from_dict(value)
-        return self._table(value) if self.texturable and isinstance(value, Spectrum) else super().check(value)
+        if self.texturable and isinstance(value, Spectrum):
+            self._check_table(value, value.spectrum)
+            return value
+        return super().check(value)
 
-    def _table(self, spectrum: Spectrum) -> Spectrum:
-        with within(str(spectrum.spectrum), ValueError):
-            for value in spectrum.table()[1]:
+    def _check_table(self, measured: Measured, where: str | Path) -> None:
+        with within(str(where), ValueError):
+            for value in measured.table()[1]:
                 self._number(value, value)
-        return spectrum
 
     def _check_value(self, value: Any) -> Any:
         if isinstance(value, list | tuple):
@@ -319,11 +345,11 @@ class Colour(Scalar):
 
 @dataclass(frozen=True)
 class Index(Colour):
-    """A colour, or the name of a measured spectrum."""
+    """A colour, the name of a measured spectrum, or a page of the refractiveindex.info database."""
 
     part: Literal["eta", "k"] = "eta"
 
-    what = "a number, [r, g, b], a name"
+    what = "a number, [r, g, b], a name, a page of refractiveindex.info"
 
     def check(self, value: Any) -> Any:
         if value is None:
@@ -336,6 +362,12 @@ class Index(Colour):
             if value not in self._names():
                 raise ValueError(unknown("name", value, self._names(), f"{LISTED}; or write numbers"))
             return value
+        if isinstance(value, Mapping) and "refractiveindex" in value:
+            value = Substance.from_dict(value)
+        if isinstance(value, Substance):
+            value = value.of(self.part)
+            self._check_table(value, value.refractiveindex)
+            return value
         return super().check(value)
 
     def single(self, value: Any) -> tuple[Any, ...]:
@@ -346,7 +378,7 @@ class Index(Colour):
         return conductors + dielectrics if self.part == "eta" else conductors
 
     def _forms(self) -> list[dict[str, Any]]:
-        return [*super()._forms(), {"enum": list(self._names())}]
+        return [*super()._forms(), {"$ref": "#/$defs/substance"}, {"enum": list(self._names())}]
 
 
 class Pair(Scalar):
@@ -399,6 +431,50 @@ class Spectrum(Record, Measured):
 
     def table(self) -> Table:
         return self._read
+
+
+class Substance(Record, Measured):
+    """The index of a substance in the refractiveindex.info database; in the place of `eta` its n, and of `k` its k.
+
+    Where its page has a k that lets no visible light pass, `eta` alone is a metal; else it is a dielectric. The page is
+    read once, when the record is made.
+
+    Raises:
+        InvalidInput: there is no such page, or its file holds none; one line that names it.
+    """
+
+    refractiveindex: Annotated[
+        str | Path, PageName("shelf/book/page, or the path of a page's YAML file, relative to the material file")
+    ]
+    _page: substances.Page = PrivateAttr()
+    _part: Literal["eta", "k"] = PrivateAttr("eta")
+
+    @model_validator(mode="after")
+    def _read_once(self) -> Substance:
+        self._page = substances.page(self.refractiveindex)
+        return self
+
+    @property
+    def opaque(self) -> bool:
+        """Whether it is a metal, which no light passes."""
+        return self._page.opaque
+
+    def of(self, part: Literal["eta", "k"]) -> Substance:
+        """The part of the index that stands in a place."""
+        made = self.model_copy()
+        made._part = part
+        return made
+
+    def table(self) -> Table:
+        """Visible wavelengths in nanometres, and the values of this part there.
+
+        Raises:
+            InvalidInput: the page has no such part.
+        """
+        curve = self._page.n if self._part == "eta" else self._page.k
+        if curve is None:
+            raise InvalidInput(f"has no {'n' if self._part == 'eta' else 'k'}")
+        return substances.visible(curve)
 
 
 class Varying(Record):
@@ -468,7 +544,7 @@ class Film(Record):
     holds = "eta and thickness_nm"
 
     eta: Annotated[
-        float | RGB | str | Spectrum | Texture,
+        float | RGB | str | Spectrum | Substance | Texture,
         Index(
             "absolute index of refraction",
             low=INDEX_LOW,
@@ -478,7 +554,7 @@ class Film(Record):
         ),
     ]
     k: Annotated[
-        float | RGB | str | Spectrum | Texture,
+        float | RGB | str | Spectrum | Substance | Texture,
         Index(
             "absolute extinction",
             low=0,

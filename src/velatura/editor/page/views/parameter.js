@@ -27,7 +27,8 @@ const SPANS = { eta: [1, 4], k: [0, 10] }; // where sliders for indices end; fie
 const PLAIN = { number: 0, pair: 0.1, angle: 0, colour: 0.5, index: 1.5 }; // in place of a texture
 
 const isTexture = (value) => value?.texture !== undefined;
-const isSpectrum = (value) => value?.spectrum !== undefined;
+const fileOf = (value) => value?.spectrum ?? value?.refractiveindex;
+const isMeasured = (value) => fileOf(value) !== undefined;
 const isBrushing = (value) => value?.brushing !== undefined;
 
 const INDICES = { dielectric: ['eta'], metal: ['conductor'], custom: ['eta', 'k'], mirror: [] };
@@ -117,7 +118,7 @@ const FORMS = {
 function simple(context, control, span = SPANS[context.key]) {
   const { value } = context;
   if (isTexture(value)) return textured(context);
-  if (isSpectrum(value)) return measured(context);
+  if (isMeasured(value)) return measured(context);
   const channels = control === colour && { hsv: spaceOf(context), beside: channelsMenu(context) };
   return { control: control({ ...context, ...channels, ...(span && { span }) }), extras: textureButton(context) };
 }
@@ -144,7 +145,7 @@ function channelsMenu(context) {
 function index(context) {
   const { services, layer, key, label, value, edit } = context;
   if (isTexture(value)) return textured(context);
-  if (isSpectrum(value)) return measured(context);
+  if (isMeasured(value)) return measured(context);
   const { names } = services.session;
   const named = typeof value === 'string';
   const groups = [
@@ -276,11 +277,11 @@ function textured(context) {
   };
 }
 
-/** A table of values over wavelength, by its file. */
+/** Values over wavelength, by the file of their table or the page of their substance. */
 function measured({ label, value, spec, edit }) {
   const act = () => edit.set(PLAIN[spec.kind]);
   return {
-    control: html`<span class="file" title=${value.spectrum}>${value.spectrum}</span>`,
+    control: html`<span class="file" title=${fileOf(value)}>${fileOf(value)}</span>`,
     extras: iconButton({ label: `${label}: remove the table`, icon: 'remove', act }),
   };
 }
