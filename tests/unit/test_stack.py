@@ -24,6 +24,7 @@ from velatura.stack import (
     Named,
     Spectrum,
     Stack,
+    Substance,
     Texture,
     dumps,
     json_schema,
@@ -34,6 +35,7 @@ from velatura.stack import (
     preset,
     presets,
     save,
+    substances,
 )
 
 COATED_GOLD = """
@@ -292,8 +294,11 @@ def stacks(draw: st.DrawFn, image: Path, table: Path) -> Stack:
     spectra = st.builds(Spectrum, spectrum=st.just(table))
     metals, dielectrics = (st.sampled_from(group) for group in names())
     surface = {"alpha": unit | st.tuples(unit | textures, unit) | textures, "rotation": finite | textures}
-    dielectric = st.builds(Interface, eta=colours(indices) | dielectrics | spectra | textures, **surface)
-    conductor = st.builds(Interface, eta=colours(indices), k=colours(extinctions) | textures, **surface)
+    pages = st.builds(Substance, refractiveindex=st.sampled_from(substances.names()))
+    glasses, opaque = pages.filter(lambda page: not page.opaque), pages.filter(lambda page: page.opaque)
+    dielectric = st.builds(Interface, eta=colours(indices) | dielectrics | spectra | glasses | textures, **surface)
+    conductor = st.builds(Interface, eta=colours(indices), k=colours(extinctions) | opaque | textures, **surface)
+    conductor |= st.builds(Interface, eta=opaque, **surface)
     named = st.builds(Interface, conductor=metals | st.just("mirror"), **surface)
     medium = st.builds(
         Medium,

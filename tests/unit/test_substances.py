@@ -222,6 +222,7 @@ def tabulated(data: str, parts: str = "nk") -> str:
             "DATA: wavelength_range: must be two wavelengths in micrometres, which ascend",
         ),
         (formula(2, "0 1 0.01", "5 9"), "OWN: must hold values at two wavelengths or more of visible light"),
+        (formula(2, "0 1 0.01", "0.2 0.36"), "OWN: must hold values at two wavelengths or more of visible light"),
         (formula(2, "-3 1 0.01"), "OWN: formula 2 has no index at 360 nm"),
         (formula(1, "0 1 0.5"), "OWN: formula 1 has no index at 360 nm"),
         (formula(3, "0 1 1e6", "0.3 9"), "OWN: must lie in 0.001 to 1e4, got 0.0"),

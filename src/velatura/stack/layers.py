@@ -13,6 +13,7 @@ from typing import Annotated, Any, ClassVar, Literal, TypeAlias
 
 from pydantic import model_validator
 
+from velatura.errors import within
 from velatura.stack.phases import Phase, PhaseRecord, WrittenPhase, asymmetry
 from velatura.stack.schema import Parameter, Record, parameters
 from velatura.stack.spectra import MIRROR, Measured, MeasuredIndex, Named, names
@@ -263,7 +264,8 @@ class Interface(LayerRecord):
         if self.k is None and isinstance(self.eta, str) and self.eta in names()[0]:
             raise ValueError(f"eta: {self.eta} is a metal; write conductor: {self.eta}")
         if self.k is None and self.conductor is None and isinstance(self.eta, Substance) and self.eta.opaque:
-            object.__setattr__(self, "k", parameters(Interface)["k"].check(self.eta))  # frozen from here on
+            with within("k", ValueError):
+                object.__setattr__(self, "k", parameters(Interface)["k"].check(self.eta))  # frozen from here on
         return self
 
     @property

@@ -34,6 +34,7 @@ ENDINGS = (".yml", ".yaml")  # of pages that are read by path
 #: A substance is opaque if k exceeds this in the mean over wavelengths of visible light: micrometres absorb it.
 OPAQUE_K, SEEN_NM = 0.01, range(400, 701, 50)
 
+_VISIBLE_UM = (VISIBLE_NM[0] * 1e-3, VISIBLE_NM[1] * 1e-3)
 _LARGEST = 2**22  # bytes of a file
 _PER_UM = 2000  # wavelengths of a formula in a spectrum: straight lines err by 1e-6
 _COEFFICIENTS = 32  # of a formula; the database has up to 17
@@ -114,7 +115,15 @@ class Page:
     @property
     def opaque(self) -> bool:
         """Whether visible light passes no thickness that is seen: the mean of k exceeds `OPAQUE_K`."""
-        return self.k is not None and sum(self.k.at(nm * 1e-3) for nm in SEEN_NM) > OPAQUE_K * len(SEEN_NM)
+        if self.k is None or not is_visible(self.k):
+            return False
+        return sum(self.k.at(nm * 1e-3) for nm in SEEN_NM) > OPAQUE_K * len(SEEN_NM)
+
+
+def is_visible(curve: Curve) -> bool:
+    """Whether visible light lies between the wavelengths that it holds."""
+    low, high = curve.range_um
+    return low < high and low < _VISIBLE_UM[1] and high > _VISIBLE_UM[0]
 
 
 def visible(curve: Curve) -> Table:
@@ -123,10 +132,9 @@ def visible(curve: Curve) -> Table:
     Raises:
         InvalidInput: it has fewer than two, or a formula has no index there.
     """
-    low, high = (end * 1e-3 for end in VISIBLE_NM)
-    if curve.range_um[0] == curve.range_um[1] or curve.range_um[0] > high or curve.range_um[1] < low:
+    if not is_visible(curve):
         raise InvalidInput("must hold values at two wavelengths or more of visible light")
-    places = curve.between(low, high)
+    places = curve.between(*_VISIBLE_UM)
     return tuple(um * 1e3 for um in places), tuple(map(curve.at, places))
 
 
