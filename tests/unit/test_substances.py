@@ -127,6 +127,17 @@ def test_a_page_with_k_is_a_metal_and_behaves_as_tables_do(tmp_path: Path) -> No
     np.testing.assert_allclose(found.energy, expected.energy, rtol=1e-12)
 
 
+def test_a_page_replaces_a_whole_index() -> None:
+    """Expected: of any metal another one, with the k of its page, unless that is given as well; of a metal glass."""
+    gold = vt.Stack([vt.Interface(eta=vt.Substance(**GOLD))])
+    steel = vt.Substance(refractiveindex="other/stainless_steel/Karlsson-austenitic")
+    for stack in (gold, vt.Stack([vt.Interface(conductor="Au")]), vt.Stack([vt.Interface(eta=0.2, k=3.0)])):
+        assert stack.replace(layer0_eta=steel) == vt.Stack([vt.Interface(eta=steel)])
+        assert stack.replace(layer0_eta=steel, layer0_k=2.0) == vt.Stack([vt.Interface(eta=steel, k=2.0)])
+    assert gold.replace(layer0_eta={"refractiveindex": "main/SiO2/Malitson"}).kinds == ("dielectric",)
+    assert gold.replace(layer0_conductor="Au") == vt.Stack([vt.Interface(conductor="Au")])
+
+
 def test_a_page_stays_with_its_material(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Expected: names as they are, paths relative to the material file; the same stack from all that is written."""
     (tmp_path / "pages").mkdir()

@@ -16,7 +16,7 @@ from velatura.errors import InvalidInput, within
 from velatura.stack.layers import EXTERIOR, KINDS, LAYERS, PERFECT, film_key, has
 from velatura.stack.schema import parameters, unknown
 from velatura.stack.spectra import MIRROR, Measured, Named
-from velatura.stack.values import RGB, Colour, Film, Scalar, Varying
+from velatura.stack.values import RGB, Colour, Film, Scalar, Substance, Varying
 
 _OPTIONS = ("name", "source", "exterior", "thin")
 _LAYER = re.compile(r"layer(\d{1,9})_(\w+)")
@@ -199,6 +199,10 @@ def _merged(old: Mapping[str, Any], new: Mapping[str, Any]) -> dict[str, Any]:
     if metal and metal == _name(fields.get("k"), "k"):
         fields = {"conductor": metal, **{key: value for key, value in fields.items() if key not in ("eta", "k")}}
 
+    # Let the page of a substance replace the whole index
+    if "k" not in new and _is_page(new.get("eta")):
+        fields.pop("k", None)
+
     # Let a phase function replace the asymmetry of another, and the other way round
     for one, other in (("phase", "g"), ("g", "phase")):
         if one in new and other not in new:
@@ -210,6 +214,10 @@ def _merged(old: Mapping[str, Any], new: Mapping[str, Any]) -> dict[str, Any]:
         u, v = alpha if isinstance(alpha, list | tuple) and len(alpha) == 2 else (alpha, alpha)
         fields["alpha"] = [fields.pop("alpha_u", u), fields.pop("alpha_v", v)]
     return fields
+
+
+def _is_page(value: Any) -> bool:
+    return isinstance(value, Substance) or (isinstance(value, Mapping) and "refractiveindex" in value)
 
 
 def _name(value: Any, part: str) -> str | None:
