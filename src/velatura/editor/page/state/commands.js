@@ -172,9 +172,10 @@ export const setValue = titled('change a value', (state, id, key, value) =>
 
 /** Gives a medium a phase function, whose asymmetry takes the place of g; without one it is that of g. */
 export const setPhase = titled('change a phase function', (state, id, phase) =>
-  changed(state, id, ({ keys: { g, phase: old, ...keys } }) => ({
-    keys: phase === undefined ? keys : { ...keys, phase },
-  })),
+  changed(state, id, ({ keys }) => {
+    const others = Object.entries(keys).filter(([key]) => key !== 'g' && key !== 'phase');
+    return { keys: Object.fromEntries(phase === undefined ? others : [...others, ['phase', phase]]) };
+  }),
 );
 
 // Films of an interface, by their number from the top -------------------------------------------------
