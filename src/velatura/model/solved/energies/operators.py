@@ -109,13 +109,13 @@ class Functional:
     @classmethod
     def together(cls, found: Sequence[Functional]) -> Functional:
         """All outcomes of some."""
-        return cls(*(_joined([getattr(each, name) for each in found], axis=1) for name in ("nodes", "beams")))
+        return cls(_joined([each.nodes for each in found]), _joined([each.beams for each in found]))
 
 
-def _joined(arrays: Sequence[Array], axis: int) -> Array:
-    """Arrays joined along an axis, of as many colours as the one of the most."""
-    colours = max(len(each) for each in arrays)
-    return np.concatenate([np.broadcast_to(each, (colours, *each.shape[1:])) for each in arrays], axis=axis)
+def _joined(outcomes: Sequence[Array]) -> Array:
+    """Shares (C, K, ...) of all outcomes, of as many colours as those of the most."""
+    colours = max(map(len, outcomes))
+    return np.concatenate([np.broadcast_to(each, (colours, *each.shape[1:])) for each in outcomes], axis=1)
 
 
 @dataclass(frozen=True)
@@ -126,9 +126,6 @@ class Layer:
     t: Operator
     r_below: Operator
     t_below: Operator
-
-    def reversed(self) -> Layer:
-        return Layer(self.r_below, self.t_below, self.r, self.t)
 
     def map(self, change: Callable[[Operator], Operator]) -> Layer:
         r, t = change(self.r), change(self.t)
