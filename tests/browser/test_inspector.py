@@ -189,27 +189,26 @@ def test_names_and_numbers_change_together(visit: Look) -> None:
 
 def test_plots_come_back_with_the_graphics_device(apart: Look) -> None:
     """Expected: what is dragged while the device is away is in the plots once it is back."""
-    visit = apart
-    tab(visit, "Energy")
-    aim(visit, "angle", 45)
-    visit.page.evaluate(
+    tab(apart, "Energy")
+    aim(apart, "angle", 45)
+    apart.page.evaluate(
         "window.away = velatura.viewport.device.gl.getExtension('WEBGL_lose_context'); away.loseContext()"
     )
-    visit.page.wait_for_function("() => velatura.viewport.lost")
-    visit.page.locator(".layer").first.get_by_label("Roughness, slider").fill("100")
-    visit.page.wait_for_timeout(300)
-    visit.page.evaluate("away.restoreContext()")
-    stack = vt.preset(PRESET).replace(layer0_alpha=visit.state("layers.0.keys.alpha"))
+    apart.page.wait_for_function("() => velatura.viewport.lost")
+    apart.page.locator(".layer").first.get_by_label("Roughness, slider").fill("100")
+    apart.page.wait_for_timeout(300)
+    apart.page.evaluate("away.restoreContext()")
+    stack = vt.preset(PRESET).replace(layer0_alpha=apart.state("layers.0.keys.alpha"))
     lobes = vt.lobes(stack, math.cos(math.radians(45)))
     parts = [*lobes.energy, lobes.remainder]
     expected = [energy[:, 0].tolist() for energy in (*parts, sum(parts))]
 
     def agrees() -> bool:
-        found = [energy if len(energy) == 3 else 3 * energy for energy in read_out(visit).values()]
+        found = [energy if len(energy) == 3 else 3 * energy for energy in read_out(apart).values()]
         return len(found) == len(expected) and all(a == pytest.approx(b, abs=1e-3) for a, b in zip(found, expected))
 
-    until(visit, agrees)
-    assert visit.complaints == []
+    until(apart, agrees)
+    assert apart.complaints == []
 
 
 def test_the_disc_tells_f_cos_where_the_pointer_is(visit: Look) -> None:

@@ -13,8 +13,10 @@ from velatura import kernel, tables
 from velatura.checks.probe import Probe
 from velatura.model import named
 from velatura.model.papers import bsdf
+from velatura.model.rough_interface import KEPT
 from velatura.model.solved.energies.energies import energies
 from velatura.model.solved.lobes.widths import nearly_straight
+from velatura.renderer import compiled
 from velatura.stack import Material
 
 mi = kernel.mitsuba("llvm_ad_rgb")
@@ -137,10 +139,14 @@ def _importance(bsdf: Any) -> Probe:
     return probe
 
 
-def test_a_material_is_prepared_by_the_same_kernels_when_its_values_change() -> None:
+def test_a_material_is_prepared_by_the_same_kernels_when_its_values_change(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Regardless of what the process has prepared before: kernels from the first value on, and nothing kept."""
     import drjit as dr
 
+    monkeypatch.setattr(compiled, "MANY", -1)
+
     def kernels(alpha: float) -> list[Any]:
+        KEPT.clear()
         dr.kernel_history_clear()
         stack = vt.Stack([vt.Interface(eta=1.5, alpha=(alpha, 0.2)), vt.Interface(conductor="Au", alpha=0.3)])
         vt.bsdf(stack, form="symmetric")

@@ -19,7 +19,7 @@ from velatura.stack import dumps, json_schema, load, loads, names, rgb, save, sp
 
 GOLD = {"refractiveindex": "main/Au/Johnson"}
 PAGE = """
-REFERENCES: A. Nobody. <a href="https://doi.org/10.1000/x_1"><i>J. &amp; Co</i> <b>5</b>, 1 (2001)</a>
+REFERENCES: A. Author. <a href="https://doi.org/10.1000/x_1"><i>J. &amp; Co</i> <b>5</b>, 1 (2001)</a>
 DATA:
   - type: tabulated nk
     data: |
@@ -166,21 +166,21 @@ def test_a_copy_of_the_database_is_read_where_the_environment_names_it(
     """Expected: its pages and those of the package, which it does not replace; also in a repository."""
     data = tmp_path / "database/data/main/Xx/nk"
     data.mkdir(parents=True)
-    (data / "Nobody.yml").write_text(PAGE)
+    (data / "Author.yml").write_text(PAGE)
     listed = "".join(
         f"- SHELF: main\n  content: [{{BOOK: {book}, name: X, content: [{{PAGE: {page}, name: Y, data: {file}}}]}}]\n"
         for book, page, file in (
-            ("Xx", "Nobody", "main/Xx/nk/Nobody.yml"),
-            ("Au", "Johnson", "main/Xx/nk/Nobody.yml"),
+            ("Xx", "Author", "main/Xx/nk/Author.yml"),
+            ("Au", "Johnson", "main/Xx/nk/Author.yml"),
             ("Xx", "Gone", "main/Xx/nk/Gone.yml"),
         )
     )
     (tmp_path / "database/catalog-nk.yml").write_text(listed)
-    with pytest.raises(InvalidInput, match=r"^unknown page of refractiveindex\.info 'main/Xx/Nobody' .*"):
-        substances.page("main/Xx/Nobody")
+    with pytest.raises(InvalidInput, match=r"^unknown page of refractiveindex\.info 'main/Xx/Author' .*"):
+        substances.page("main/Xx/Author")
     for folder in (tmp_path, tmp_path / "database"):
         monkeypatch.setenv(substances.COPY, str(folder))
-        page = substances.page("main/Xx/Nobody")
+        page = substances.page("main/Xx/Author")
         assert page.n and page.n.at(0.55) == pytest.approx(1.6)
         assert set(substances.names()) < set(substances.entries())
         assert substances.page("main/Au/Johnson").n != page.n
@@ -193,12 +193,12 @@ def test_a_copy_of_the_database_is_read_where_the_environment_names_it(
     ):
         (tmp_path / "database/catalog-nk.yml").write_text(text)
         with pytest.raises(InvalidInput, match=rf"^VELATURA_REFRACTIVEINDEX: \S*catalog-nk\.yml: {reason}$"):
-            substances.page("main/Xx/Nobody")
+            substances.page("main/Xx/Author")
     monkeypatch.setenv(substances.COPY, str(tmp_path / "none"))
     with pytest.raises(
         InvalidInput, match=r"^VELATURA_REFRACTIVEINDEX: \S*none/database/catalog-nk.yml: file not found$"
     ):
-        substances.page("main/Xx/Nobody")
+        substances.page("main/Xx/Author")
     assert substances.page("main/Au/Johnson")
 
 
@@ -308,7 +308,7 @@ def test_a_page_is_cited_with_its_reference_and_the_database(tmp_path: Path) -> 
         "https://doi.org/10.1103/PhysRevB.6.4370 (main/Au/Johnson of refractiveindex.info)"
     )
     path = tmp_path / "own.yml"
-    path.write_text(PAGE.replace("Nobody", r"No\b}{ody_1"))
+    path.write_text(PAGE.replace("Author", r"No\b}{ody_1"))
     entry = citations.entries([str(path)])[str(path)]
     assert r"note         = {A. No b  ody\_1. J. \& Co 5, 1 (2001)}" in entry and entry.count("{") == entry.count("}")
     with pytest.raises(InvalidInput, match=r"^unknown page of refractiveindex\.info 'main/Au/X'"):

@@ -4,7 +4,7 @@ Not a figure of a paper. The error is that of the benchmark's second edition, st
 grazing angles; that of other walks is the noise of the truth. An evaluation is `eval_pdf` over that of Mitsuba's
 `roughconductor`, of one lobe. A change is another value of a roughness, until the BSDF has been evaluated once, in
 milliseconds of the processor. Programs with parameters of their own, `principled` and OpenPBR, are fitted to the stack
-again, which is most of what a change takes there. OpenPBR is evaluated by formulas in NumPy, which nobody renders with.
+again, which is most of what a change takes there. OpenPBR is evaluated by formulas in NumPy, which no renderer uses.
 """
 
 from __future__ import annotations

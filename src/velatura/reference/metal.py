@@ -36,15 +36,17 @@ class WalkedMetal:
 
     def reflectance(self, cosine: Value, n_in: Value) -> Value:
         """Reflectance of its facets below a medium of that index, at all wavelengths."""
-        above = self.wide(n_in)
-        eta, k = (part / above for part in self.index)
-        return fresnel.conductor(cosine, eta, k)
+        return fresnel.conductor(cosine, *self._below(n_in))
 
     def amplitudes(self, cosine: Value, n_in: Value) -> tuple[Complex, Complex]:
         """Amplitudes of light of either polarisation that its facets reflect."""
+        return fresnel.conductor_amplitudes(cosine, *self._below(n_in))
+
+    def _below(self, n_in: Value) -> tuple[Value, Value]:
+        """Its index, relative to a medium above."""
         above = self.wide(n_in)
-        eta, k = (part / above for part in self.index)
-        return fresnel.conductor_amplitudes(cosine, eta, k)
+        eta, k = self.index
+        return eta / above, k / above
 
     def wide(self, colour: Value) -> Value:
         """A colour of channels for what paths carry; a number stays one."""

@@ -214,7 +214,7 @@ def _moments(table: Table) -> tuple[float, float]:
 #: A phase function as written: a word, or a record; by `g` it is none of these.
 WrittenPhase: TypeAlias = str | PhaseRecord
 
-#: The records by their names in the schema and the manual. Each is told from the others by its first key.
+#: The records by their names in the schema and the manual. Its first key identifies each.
 RECORDS: dict[str, type[PhaseRecord]] = {"two_lobes": TwoLobes, "phase_table": PhaseTable, "mie": Mie}
 
 

@@ -27,7 +27,7 @@ from velatura.model.solved.grid import Folded, Grid, Listed
 from velatura.model.solved.guards import ALBEDO_MIN, COS_ON_GRID_MIN, ENERGY_EPS, WIDTH_ALPHA_MAX
 from velatura.model.solved.lobes import refracted_lobe, remainder, top_medium, widths
 from velatura.model.solved.lobes.refracted_lobe import MediumIndex
-from velatura.model.solved.lobes.remainder import Remainder, RemainderSamples
+from velatura.model.solved.lobes.remainder import Remainder
 from velatura.model.solved.lobes.top_medium import ORDERS, TopMedium, TopSamples
 from velatura.model.solved.lobes.widths import Tensor
 from velatura.model.solved.sample_allocation import Demand
@@ -237,7 +237,7 @@ class Solver:
         found = [replace(each, columns=replace(each.columns, scale=0 * each.columns.scale + 1)) for each in found]
         numbers, folded = self.body(material, found, layouts), Folded.of(self.grid.coarser(material), material)
         factors, wanted = reciprocal_balance.factors(
-            numbers, folded.directions, folded.shares, folded.count, self.samples, _few(1.0, len(material.interfaces))
+            numbers, folded.directions, folded.shares, folded.count, self.samples, _share(len(material.interfaces))
         )
 
         def spread(values: Array) -> Array:
@@ -373,7 +373,7 @@ class Solver:
         """Divide energies of lobes by their integrals; the remainder takes what light it can, by which a lobe would be
         too bright, and has the energy that is returned. `whole` is its albedo without a scale."""
         drawn = []
-        normals = self.normals or (FINELY[1] if self.finely else round(_few(NORMALS[self.isotropic], len(lobes))))
+        normals = self.normals or (FINELY[1] if self.finely else round(_share(len(lobes)) * NORMALS[self.isotropic]))
         for (shape, tensor), own in zip(lobes, energies):
             lobe = shape.lobe(1.0, tensor.roughness(folded.phi))
             z, squares, largest = refracted_lobe.integrals(lobe, folded.directions, normals)
@@ -515,7 +515,7 @@ def solve(material: Material, model: Model, variance: type[Variance], context: C
     """The BSDF of a material with constants of a renderer; differentiable."""
     material = material.solid()
     start, given = plain(material), Variables.of(material)
-    solver = replace(Solver.of(model, variance, context, start), apart=True)
+    solver = Solver.of(model, variance, context, start)
     layouts = solver.layouts([start])
     solver = replace(solver, apart=any(layout.top is not None for layout in layouts))
 
@@ -546,20 +546,23 @@ def solve(material: Material, model: Model, variance: type[Variance], context: C
 
 def remainder_of(numbers: Sequence[Value], solver: Solver, context: Context) -> Remainder:
     """The remainder of a renderer's numbers."""
-    assert context.colour is not None
-    width, count = solver.colours, len(fields(Remainder))
-    each = [ops.channel(x, k % width) for k, x in enumerate(numbers[: count * width])]
-    return Remainder(*(context.colour(*each[k : k + width]) for k in range(0, len(each), width)))
+    return Remainder(*_coloured(numbers[: len(fields(Remainder)) * solver.colours], solver, context))
 
 
 def top_of(material: Material, layout: Layout, numbers: Sequence[Value], solver: Solver, context: Context) -> TopMedium:
     """The medium on top of a material of a renderer's values, by the numbers that come after those of the remainder."""
-    assert context.colour is not None
-    width, begin = solver.colours, len(fields(Remainder)) * solver.colours
-    end = begin + len(ORDERS) * width
-    own = [ops.channel(x, k % width) for k, x in enumerate(numbers[begin:end])]
-    shares = [context.colour(*own[k : k + width]) for k in range(0, len(own), width)]
+    begin = len(fields(Remainder)) * solver.colours
+    end = begin + len(ORDERS) * solver.colours
+    shares = _coloured(numbers[begin:end], solver, context)
     return TopMedium.of(material, layout.top, shares, [ops.channel(x, 0) for x in numbers[end:]])
+
+
+def _coloured(numbers: Sequence[Value], solver: Solver, context: Context) -> list[Value]:
+    """A renderer's numbers, those of each colour in a row, as colours."""
+    assert context.colour is not None
+    width = solver.colours
+    each = [ops.channel(x, k % width) for k, x in enumerate(numbers)]
+    return [context.colour(*each[k : k + width]) for k in range(0, len(each), width)]
 
 
 def _scattered_back(material: Material, place: int, nodes: Nodes) -> list[Array]:
@@ -616,9 +619,9 @@ def sides(material: Material) -> list[Material]:
     return [material, material.reversed()] if material.transmits else [material]
 
 
-def _few(samples: float, parts: int) -> float:
-    """Count of samples of each part, less where a stack has many, so that its time stays bounded."""
-    return samples * min(1.0, MANY / max(parts, 1))
+def _share(parts: int) -> float:
+    """Share of the usual samples that each of some parts has: less where there are many, so that time stays bounded."""
+    return min(1.0, MANY / max(parts, 1))
 
 
 def _reflects_all(found: Sequence[Part]) -> bool:
@@ -640,12 +643,9 @@ def _uncoloured(material: Material) -> Material:
 def _clipped(polynomial: Remainder, top: TopMedium | None, wi: Direction) -> tuple[Array, Array]:
     """Albedo that a remainder of numbers (C, 1) gains by a medium on top, and by being clipped, and the largest weight
     of its samples, (C, M)."""
-    numbers = Remainder(*(x[..., None] for x in vars(polynomial).values()))
+    numbers, top = direct.wider(polynomial), direct.wider(top)
     x, y, z = (each[:, None] for each in wi)
-    samples: RemainderSamples | TopSamples = numbers.samples
-    if top:
-        top = replace(top, **{k: _wider(getattr(top, k)) for k in ("albedo", "depth", "shares")})
-        samples = TopSamples(numbers.samples, top)
+    samples = TopSamples(numbers.samples, top) if top else numbers.samples
     # Not where it is sampled: directions of samples jump with the numbers
     cosine, turn = low_discrepancy.fibonacci(4 * EVENLY if top else EVENLY)
     sine, phi = np.sqrt(1 - cosine * cosine), 2 * np.pi * turn
@@ -653,11 +653,6 @@ def _clipped(polynomial: Remainder, top: TopMedium | None, wi: Direction) -> tup
     value = top_medium.value(numbers, top, (x, y, z), wo) if top else numbers.value((x, y, z), wo)
     gained = value - numbers.unclipped((x, y, z), wo)[1] * (cosine / np.pi)
     return 2 * np.pi * gained.mean(axis=-1), ops.divide(value, samples.density((x, y, z), wo)).max(axis=-1)
-
-
-def _wider(values: Any) -> Any:
-    """Arrays with one axis more."""
-    return values[..., None] if isinstance(values, np.ndarray) else values
 
 
 def _passing(transmission: Transmission, solved: Energies, cosines: Array) -> Array:

@@ -71,19 +71,21 @@ def product(first: Matrix, second: Matrix) -> Matrix:
     for each in (first, second):
         if isinstance(each, Blocks) and not each.values.any():
             return each
-    if isinstance(first, Blocks) and isinstance(second, Blocks):
-        width = max(first.width, second.width)
-        if width == 1:
-            return Blocks(first.values * second.values)
-        return Blocks(first.wider(width).values @ second.wider(width).values)
-    return applied(first, second) if not isinstance(second, Blocks) else composed(np.asarray(first), second)
+    if not isinstance(second, Blocks):
+        return applied(first, second)
+    if not isinstance(first, Blocks):
+        return composed(first, second)
+    width = max(first.width, second.width)
+    if width == 1:
+        return Blocks(first.values * second.values)
+    return Blocks(first.wider(width).values @ second.wider(width).values)
 
 
 def applied(matrix: Matrix, columns: Array) -> Array:
     """What a matrix makes of columns (C, F, n, M)."""
     if not isinstance(matrix, Blocks):
         return _dense(matrix, columns)
-    each = columns.reshape(*columns.shape[:2], -1 if columns.size else matrix.count, matrix.width, columns.shape[-1])
+    each = columns.reshape(*columns.shape[:2], matrix.count, matrix.width, columns.shape[-1])
     found = matrix.values * each if matrix.width == 1 else matrix.values @ each
     return found.reshape(*found.shape[:2], *columns.shape[-2:])
 

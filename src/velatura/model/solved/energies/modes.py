@@ -308,11 +308,11 @@ class Even(Basis):
             nodes = Blocks(by_mode(layer.nodes)[:, None])
         columns = by_mode(layer.columns)
         columns = columns * self._basis(phi)[:, None] if columns.shape[-1] else columns
-        return Operator(nodes, self._sorted(columns), layer.beams)
+        return Operator(nodes, self._flat(columns), layer.beams)
 
     def columns(self, light: Array, rotation: float) -> Array:
         found = self._turned(rotation).T @ light.reshape(len(light), self.modes, -1)
-        return self._sorted(found.reshape(len(found), self.modes, self.nodes.count, -1))
+        return self._flat(found.reshape(len(found), self.modes, self.nodes.count, -1))
 
     def operators(self, light: Array, rotation: float) -> Array:
         n, modes, (azimuths, weights) = self.nodes.count, self.modes, self.rule
@@ -334,10 +334,10 @@ class Even(Basis):
         return np.asarray(np.einsum("ax,can->cxn", self._turned(rotation), projected))
 
     def outer(self, emitted: Array, taken: Array) -> Array:
-        rows = self._sorted(emitted[..., None])
+        rows = self._flat(emitted[..., None])
         if taken.ndim == 2:
             return rows * taken[:, None, None]
-        return rows * self._sorted(taken[..., None]).swapaxes(-1, -2)
+        return rows * self._flat(taken[..., None]).swapaxes(-1, -2)
 
     def swung(self, light: Array, swing: float, there: Array, here: Array, phi: Array | None = None) -> Array:
         count, colours = self.nodes.count, len(light)
@@ -346,14 +346,14 @@ class Even(Basis):
         if phi is not None:
             lit = np.zeros((colours, self.modes, count, len(here)))
             lit[:, of_second] = self._basis(phi)[of_second, None] * wave[:, None]
-            return light + self._sorted(lit)
+            return light + self._flat(lit)
         matrix = np.zeros((colours, self.modes, count, self.modes, count))
         for k in of_second:
             matrix[:, k, :, k] = wave
         return light + matrix.reshape(light.shape)
 
-    def _sorted(self, light: Array) -> Array:
-        """Light (C, modes, N, M) of one family, (C, 1, n, M)."""
+    def _flat(self, light: Array) -> Array:
+        """Light (C, modes, N, M) as that of one family, (C, 1, n, M)."""
         return light.reshape(len(light), 1, self.size, -1)
 
     @property

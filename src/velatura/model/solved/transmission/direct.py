@@ -568,7 +568,7 @@ def integrals(
     z = np.sqrt(np.maximum(1 - x * x - y * y, 1e-12))
     area = area / (n_out * n_out * z)
     directions = [each.reshape(len(x), -1) for each in (x, y, -z, area)]
-    _, found = compiled.over(_passed, wi, directions, _wider(transmission))
+    _, found = compiled.over(_passed, wi, directions, wider(transmission))
     *energy, passes = found
     count = len(energy) // 2
     return np.array(energy[:count]), np.array(energy[count:]), passes
@@ -582,14 +582,14 @@ def _passed(
     return [], [value * area, value * area * ops.divide(value, density), density * area]
 
 
-def _wider(values: Any) -> Any:
+def wider(values: Any) -> Any:
     """Records of arrays, with one axis more."""
     if isinstance(values, np.ndarray):
         return values[..., None]
     if isinstance(values, Roughness):
-        return Roughness(*map(_wider, values))
+        return Roughness(*map(wider, values))
     if isinstance(values, tuple):
-        return tuple(map(_wider, values))
+        return tuple(map(wider, values))
     if is_dataclass(values) and not isinstance(values, type):
-        return type(values)(*(_wider(x) for x in vars(values).values()))
+        return type(values)(*(wider(x) for x in vars(values).values()))
     return values
