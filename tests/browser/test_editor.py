@@ -23,6 +23,7 @@ from fuzzing.hands import Hands
 from matplotlib.image import imsave
 
 import velatura as vt
+from velatura.stack import rgb
 
 pytestmark = pytest.mark.skipif(bool(chromium.missing()), reason=chromium.missing())
 
@@ -333,14 +334,36 @@ def test_metals_are_found_by_their_names(visit: Open) -> None:
         "Industrial metals",
         "Ceramics and oxides",
         "Other conductors",
+        "refractiveindex.info",
     ]
     titles = [title for _, group in groups for title in group]
-    assert len(set(titles)) == len(titles) > 40
+    assert len(set(titles)) == len(titles) > 70
+    assert not any("Palik" in title for title in titles)
     assert all(group == sorted(group) for _, group in groups)
     menu.focus()
     page.page.keyboard.type("silv")
     page.settled()
     assert page.state("layers.0.keys.conductor") == "Ag"
+
+
+def test_substances_of_refractiveindex_info_are_metals_and_dielectrics(visit: Open) -> None:
+    """Expected: a page that is chosen is drawn, stands in the menu, and its numbers are those of the page."""
+    page = visit()
+    open_preset(page, "Gold")
+    metal = page.page.get_by_label("Metal", exact=True)
+    metal.select_option("main/Ti/Johnson")
+    page.settled()
+    titanium = {"refractiveindex": "main/Ti/Johnson"}
+    assert (page.state("layers.0.keys.eta"), page.state("layers.0.keys.k")) == (titanium, titanium)
+    assert metal.input_value() == "main/Ti/Johnson"
+    kind = page.page.get_by_label("Kind of layer", exact=True).first
+    kind.select_option("custom")
+    page.settled()
+    assert page.state("layers.0.keys.eta") == pytest.approx(rgb(vt.Substance(**titanium)), rel=1e-3)
+    kind.select_option("dielectric")
+    page.page.get_by_label("Index, by name", exact=True).select_option("popular_glass/SF11/SCHOTT")
+    page.settled()
+    assert page.state("layers.0.keys.eta") == {"refractiveindex": "popular_glass/SF11/SCHOTT"}
 
 
 def test_reloading_loses_nothing(visit: Open) -> None:

@@ -22,7 +22,7 @@ const SESSION = {
       phase: { kind: 'phase' },
     },
   },
-  names: { dielectrics: { bk7: 1.5 }, conductors: { Au: {} } },
+  names: { dielectrics: { bk7: 1.5 }, conductors: { Au: {} }, pages: { 'a/b/c': {} } },
 };
 const FILM = { eta: 1.4, thickness_nm: 100 };
 const of = (...layers) => ({ layers });
@@ -32,6 +32,7 @@ test('materials of all kinds of values pass', () => {
   const medium = { medium: { sigma_a: [0, 1, 2], g: 0.9 } };
   check({ name: 'Gold', exterior: 1.33, thin: false, ...of(coat, medium, { interface: { conductor: 'Au' } }) }, SESSION);
   check(of({ interface: { eta: 'bk7', alpha: 0 } }, { medium: null }), SESSION);
+  check(of({ interface: { eta: { refractiveindex: 'a/b/c' } } }), SESSION);
   check(of({ interface: { eta: 1.5, films: [{ eta: 'bk7', thickness_nm: 200 }] } }), SESSION);
 });
 
@@ -48,6 +49,7 @@ for (const [material, why] of [
   [of({ medium: { sigma_a: [1, 2] } }), /sigma_a: must not be 2 numbers/],
   [of({ medium: { sigma_a: 'red' } }), /sigma_a: must be a number/],
   [of({ interface: { alpha: { texture: 'a.png' } } }), /alpha: textures and spectra need Python/],
+  [of({ interface: { eta: { refractiveindex: 'a/b' } } }), /eta: textures and spectra need Python/],
   [of({ interface: { eta: 'glass' } }), /eta: glass is not a known name/],
   [of({ interface: { eta: 'constructor' } }), /eta: constructor is not a known name/],
   [of({ interface: { conductor: 'Fe' } }), /conductor: must be one of mirror, Au/],

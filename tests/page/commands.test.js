@@ -14,6 +14,7 @@ const SESSION = { default_model: 'velatura' };
 const NAMES = {
   dielectrics: { bk7: 1.5168 },
   conductors: { Al: { eta: [1.65749, 0.880369, 0.521229], k: [9.22387, 6.26952, 4.837] } },
+  pages: { 'main/Ti/Johnson': { title: 'Titanium', opaque: true, eta: [2.74, 2.54, 2.27], k: [3.81, 3.43, 3.04] } },
 };
 const FRESH = { interface: { eta: 1.5, alpha: 0.1 }, diffuse: { albedo: [0.5, 0.5, 0.5] } };
 const MATERIAL = {
@@ -89,6 +90,22 @@ test('any base becomes any other', () => {
     assert.equal(variantOf(state.layers.at(-1)), variant);
   }
   assert.equal(documentOf(state).layers.length, 2);
+});
+
+test('a page of refractiveindex.info is a metal', () => {
+  const base = (state) => documentOf(state).layers.at(-1).interface;
+  const page = { refractiveindex: 'main/Ti/Johnson' };
+  const surface = { alpha: [0.1, 0.3], rotation: 30 };
+  const metal = commands.setVariant(commands.removeLayer(opened(), 2), 3, 'metal', NAMES, FRESH);
+  const measured = commands.setMetal(metal, 3, 'main/Ti/Johnson', NAMES);
+  assert.deepEqual(base(metal), { conductor: 'Al', ...surface });
+  assert.deepEqual(base(measured), { eta: page, k: page, ...surface });
+  assert.equal(variantOf(measured.layers.at(-1)), 'metal');
+  assert.equal(layerName(measured.layers.at(-1), {}), 'main/Ti/Johnson');
+  assert.deepEqual(base(commands.setMetal(measured, 3, 'Al', NAMES)), { conductor: 'Al', ...surface });
+  const numbers = commands.setVariant(measured, 3, 'custom', NAMES, FRESH);
+  assert.deepEqual(base(numbers), { eta: [2.74, 2.54, 2.27], k: [3.81, 3.43, 3.04], ...surface });
+  assert.equal(base(commands.setVariant(measured, 3, 'dielectric', NAMES, FRESH)).eta, 1.5);
 });
 
 test('layers have identities of their own', () => {

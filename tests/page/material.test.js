@@ -6,7 +6,7 @@ import { test } from 'node:test';
 import { flat } from '../../src/velatura/editor/page/state/material.js';
 
 const SESSION = {
-  names: { dielectrics: { bk7: 1.5 }, conductors: { Al: { eta: [1, 2, 3], k: [4, 5, 6] } } },
+  names: { dielectrics: { bk7: 1.5 }, conductors: { Al: { eta: [1, 2, 3], k: [4, 5, 6] } }, pages: { Ti: { eta: [7, 8, 9], k: [3, 2, 1] } } },
   schema: {
     interface: {
       eta: { kind: 'index', default: null },
@@ -28,6 +28,9 @@ test('an interface has the indices of its kind, and its roughness along both axe
   const found = (keys) => valuesOf('interface', { alpha: [0.1, 0.3], ...keys });
   assert.deepEqual(found({ eta: 'bk7' }), { ...rest, layer0_eta: 1.5 });
   assert.deepEqual(found({ conductor: 'Al' }), { ...rest, layer0_eta: [1, 2, 3], layer0_k: [4, 5, 6] });
+  const page = { refractiveindex: 'Ti' };
+  assert.deepEqual(found({ eta: page, k: page }), { ...rest, layer0_eta: [7, 8, 9], layer0_k: [3, 2, 1] });
+  assert.deepEqual(found({ eta: { refractiveindex: 'mine.yml' } }), rest);
   assert.deepEqual(found({ eta: 2, k: 3 }), { ...rest, layer0_eta: 2, layer0_k: 3 });
   assert.deepEqual(found({ conductor: 'mirror' }), rest);
 });

@@ -7,7 +7,7 @@ import { follow } from '../../src/velatura/editor/page/state/picture.js';
 
 const SESSION = {
   default_model: 'velatura',
-  names: { dielectrics: {}, conductors: {} },
+  names: { dielectrics: {}, conductors: {}, pages: {} },
   schema: { interface: { eta: { kind: 'index', default: 1.5 }, alpha: { kind: 'pair', default: 0.1 } } },
 };
 

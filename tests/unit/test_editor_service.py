@@ -74,6 +74,11 @@ def test_a_session_is_json_and_names_all_there_is() -> None:
     assert session["opened"] is None
     assert {"bk7", "water"} <= set(session["names"]["dielectrics"])
     assert all(len(index["eta"]) == len(index["k"]) == 3 for index in session["names"]["conductors"].values())
+    pages = session["names"]["pages"]
+    gold, water = pages["main/Au/Johnson"], pages["main/H2O/Hale"]
+    assert (gold["title"], gold["opaque"]) == ("Gold (Johnson and Christy 1972)", True)
+    assert (water["title"], water["opaque"]) == ("Water (Hale and Querry 1973: Water; 25 °C)", False)
+    assert len({page["title"] for page in pages.values()}) == len(pages) == 96
 
 
 def test_a_new_layer_of_every_kind_is_as_declared() -> None:

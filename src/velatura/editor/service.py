@@ -36,7 +36,20 @@ from velatura.model import DEFAULT, MODELS, SWITCHES, Model
 from velatura.scenes.environments import PHOTOGRAPHS, sky, studio
 from velatura.scenes.objects import OBJECTS, ground, plinth
 from velatura.scenes.surfaces import Mesh
-from velatura.stack import Named, Stack, Texture, dumps, loads, names, phases, preset, presets, rgb
+from velatura.stack import (
+    Named,
+    Stack,
+    Substance,
+    Texture,
+    dumps,
+    loads,
+    names,
+    phases,
+    preset,
+    presets,
+    rgb,
+    substances,
+)
 from velatura.stack.layers import LAYERS, LayerRecord, has
 from velatura.stack.phases import Phase
 from velatura.stack.schema import Parameter, Record, parameters, unknown
@@ -172,12 +185,19 @@ def _model(model: Model) -> Answer:
 
 
 def _names() -> Answer:
-    """Named indices as RGB."""
+    """Named indices as RGB, and those of the pages of refractiveindex.info that come with the package."""
     conductors, dielectrics = names()
     return {
         "dielectrics": {name: rgb(Named(name, "eta")) for name in dielectrics},
         "conductors": {name: {"eta": rgb(Named(name, "eta")), "k": rgb(Named(name, "k"))} for name in conductors},
+        "pages": {name: _page(name) for name in substances.names()},
     }
+
+
+def _page(name: str) -> Answer:
+    eta = Substance(refractiveindex=name)
+    k = rgb(eta.of("k")) if eta.opaque else 0
+    return {"title": substances.entry(name).short, "opaque": eta.opaque, "eta": rgb(eta), "k": k}
 
 
 def shader(body: Body) -> Answer:

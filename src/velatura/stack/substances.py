@@ -216,6 +216,14 @@ class Entry:
     title: str
     path: Path
 
+    @property
+    def short(self) -> str:
+        """The substance, and who measured it, as a menu has them: "Gold (Johnson and Christy 1972)"."""
+        words = re.search(r" \((.+)\)$", self.book)
+        substance = (words[1] if words else self.book).split(", ")[0]
+        measured = re.sub(r"n(,k)?(\(o\))? [\d.e–]+ µm(; )?", "", self.title).strip(" :;")
+        return f"{substance} ({measured})"
+
 
 def names() -> tuple[str, ...]:
     """The names, shelf/book/page, of the pages that come with the package."""

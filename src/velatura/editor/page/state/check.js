@@ -1,5 +1,6 @@
 // Whether a document is a material, by the parameters that the session declares.
 
+import { pageOf } from './material.js';
 import { objection } from './range.js';
 
 const SEVERAL = { pair: 2, colour: 3, index: 3 }; // numbers that a parameter may have
@@ -45,6 +46,7 @@ function refusal(value, spec, names) {
   }
   if (kind === 'phase') return 'phase functions need Python';
   if (kind === 'choice') return options.includes(value) ? '' : `must be one of ${options.join(', ')}`;
+  if (kind === 'index' && Object.hasOwn(names.pages, pageOf(value) ?? '')) return '';
   if (value !== null && typeof value === 'object' && !Array.isArray(value)) return 'textures and spectra need Python';
   if (kind === 'index' && typeof value === 'string')
     return [names.dielectrics, names.conductors].some((known) => Object.hasOwn(known, value)) ? '' : `${value} is not a known name`;

@@ -1,7 +1,7 @@
 // Commands: pure functions from a state to the next, each with the title that undo shows.
 
 import { besideOf, isPaired, slotBeside } from './compared.js';
-import { documentOf, enabled, indices, isBase, isOpaque, layersOf, variantOf } from './material.js';
+import { documentOf, enabled, indices, isBase, isOpaque, layersOf, metalOf, variantOf } from './material.js';
 
 const titled = (title, command) => Object.assign(command, { title });
 
@@ -214,18 +214,35 @@ export const setVariant = titled('change the kind of a layer', (state, id, varia
 function become(variant, kind, keys, names, fresh) {
   if (variantOf({ kind, keys }) === variant) return {};
   if (variant === 'diffuse') return { kind: 'diffuse', keys: fresh.diffuse };
-  const { eta, k, conductor, ...surface } = kind === 'interface' ? keys : fresh.interface;
-  const metal = conductor === undefined || conductor === 'mirror' ? 'Al' : conductor;
+  const own = kind === 'interface' ? keys : fresh.interface;
+  const named = metalOf(own);
+  const { eta, k } = named === undefined ? own : {};
+  const metal = indicesOf(named === undefined || named === 'mirror' ? 'Al' : named, names);
   const index = {
     dielectric: () => ({ eta: typeof eta === 'string' && names.conductors[eta] ? 1.5 : (eta ?? 1.5) }),
-    metal: () => ({ conductor: metal }),
+    metal: () => metal,
     custom: () => ({
-      eta: kind === 'interface' && eta !== undefined ? eta : rounded(indices(metal, 'eta', names)),
-      k: k ?? rounded(indices(metal, 'k', names)),
+      eta: kind === 'interface' && eta !== undefined ? eta : rounded(indices(metal.conductor ?? metal.eta, 'eta', names)),
+      k: k ?? rounded(indices(metal.conductor ?? metal.k, 'k', names)),
     }),
     mirror: () => ({ conductor: 'mirror' }),
   };
-  return { kind: 'interface', keys: { ...index[variant](), ...surface } };
+  return { kind: 'interface', keys: { ...index[variant](), ...surfaceOf(own) } };
+}
+
+/** Puts another metal by name, or by the page of refractiveindex.info, in the place of the indices of an interface. */
+export const setMetal = titled('change a metal', (state, id, name, names) =>
+  changed(state, id, ({ keys }) => ({ keys: { ...indicesOf(name, names), ...surfaceOf(keys) } })),
+);
+
+/** The values of an interface but its indices. */
+const surfaceOf = (keys) =>
+  Object.fromEntries(Object.entries(keys).filter(([key]) => !['eta', 'k', 'conductor'].includes(key)));
+
+/** The indices of a metal, as a file has them. */
+function indicesOf(name, names) {
+  const page = { refractiveindex: name };
+  return name === 'mirror' || Object.hasOwn(names.conductors, name) ? { conductor: name } : { eta: page, k: page };
 }
 
 const rounded = (colour) => colour.map((channel) => Number(channel.toPrecision(4)));

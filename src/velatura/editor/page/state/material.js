@@ -26,12 +26,22 @@ export function documentOf(state) {
 /** What a layer is: an interface `dielectric`, `metal` (by name), `custom` (eta and k) or `mirror`, else its kind. */
 export function variantOf({ kind, keys }) {
   if (kind !== 'interface') return kind;
-  if (keys.conductor !== undefined) return keys.conductor === 'mirror' ? 'mirror' : 'metal';
+  const metal = metalOf(keys);
+  if (metal !== undefined) return metal === 'mirror' ? 'mirror' : 'metal';
   return keys.k === undefined ? 'dielectric' : 'custom';
 }
 
 /** Whether a layer lies below all others, at all values. */
 export const isBase = ({ kind }) => kind === 'diffuse';
+
+/** The name of a metal, which may be that of a page of refractiveindex.info for eta and k alike; else undefined. */
+export function metalOf({ conductor, eta, k }) {
+  const page = pageOf(eta);
+  return conductor ?? (page === pageOf(k) ? page : undefined);
+}
+
+/** The page of refractiveindex.info that an index is read from. */
+export const pageOf = (value) => value?.refractiveindex;
 
 export const isOpaque = (layer) =>
   isBase(layer) || (layer.kind === 'interface' && variantOf(layer) !== 'dielectric');
@@ -40,12 +50,14 @@ export const isOpaque = (layer) =>
 export function layerName(layer, declared) {
   const { kind, keys } = layer;
   if (kind !== 'interface') return declared[kind].title;
-  if (keys.conductor !== undefined) return keys.conductor;
+  const metal = metalOf(keys);
+  if (metal !== undefined) return metal;
   return typeof keys.eta === 'string' ? keys.eta : variantOf(layer) === 'custom' ? 'metal' : 'dielectric';
 }
 
-/** A number or three, where a name may stand: indices of `names` ({dielectrics, conductors}). */
+/** A number or three, where a name or a page may stand: indices of `names` ({dielectrics, conductors, pages}). */
 export function indices(value, part, names) {
+  if (Object.hasOwn(names.pages, pageOf(value) ?? '')) return names.pages[pageOf(value)][part];
   if (typeof value !== 'string') return value;
   return names.conductors[value]?.[part] ?? (part === 'eta' ? names.dielectrics[value] : 0);
 }

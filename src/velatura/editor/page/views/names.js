@@ -29,35 +29,38 @@ const DIELECTRICS = {
     ...{ amber: 'Amber', CsI: 'Caesium iodide', diamond: 'Diamond', ice: 'Ice', MgO: 'Magnesium oxide' },
     ...{ rutile: 'Rutile', 'TiO2-e': 'Rutile, extraordinary', salt: 'Salt', sapphire: 'Sapphire' },
     ...{ SiC: 'Silicon carbide', ThF4: 'Thorium fluoride' },
-    ...{ 'd-C_palik': 'Diamond (Palik)', TiO2_palik: 'Rutile (Palik)' },
   },
 };
 
-const PALIK = '_palik'; // the same substance, as Palik's handbook has it
+const PALIK = '_palik'; // the same substance, as Palik's handbook has it: for those that have no other numbers
 
-/** Groups of a menu, each in the order of its words; the last has the names of `known` for which there are none. */
-function grouped(groups, known) {
-  const options = (words) =>
-    Object.entries(words)
-      .flatMap(([name, title]) => [
-        [name, title],
-        [name + PALIK, `${title} (Palik)`],
-      ])
-      .filter(([name]) => name in known)
-      .sort(([, a], [, b]) => a.localeCompare(b));
+/**
+ * Groups of a menu, each in the order of its words: those of `known`, of which one in other words for the same is left
+ * out, those that no words are of, and at last the measured pages.
+ */
+function grouped(groups, known, pages) {
+  const sorted = (options) => options.sort(([, a], [, b]) => a.localeCompare(b));
+  const nameOf = (name) => [name, name + PALIK].find((each) => Object.hasOwn(known, each));
+  const options = (words) => sorted(Object.entries(words).map(([name, title]) => [nameOf(name), title])).filter(([name]) => name);
   const found = Object.entries(groups).map(([group, words]) => ({ group, options: options(words) }));
   const listed = found.flatMap(({ options }) => options.map(([name]) => name));
   const values = new Set(listed.map((name) => JSON.stringify(known[name])));
-  const isOther = (name) => !listed.includes(name) && !values.has(JSON.stringify(known[name]));
+  const isOther = (name) => !nameIn(listed, name) && !values.has(JSON.stringify(known[name]));
   const others = { group: 'Others', options: Object.keys(known).filter(isOther) };
-  return [...found, others].filter(({ options }) => options.length);
+  const measured = { group: 'refractiveindex.info', options: sorted(pages.map(([name, { title }]) => [name, title])) };
+  return [...found, others, measured].filter(({ options }) => options.length);
 }
 
+/** Whether a menu lists a name, or the same substance by one. */
+const nameIn = (listed, name) => listed.includes(name) || listed.includes(name.replace(PALIK, ''));
+
 /** The groups of a menu of metals; a name that only stands for one of them is left out. */
-export const metals = (names) => grouped(METALS, names.conductors);
+export const metals = (names) => grouped(METALS, names.conductors, pagesOf(names, true));
 
 /** The same for dielectrics. */
-export const dielectrics = (names) => grouped(DIELECTRICS, names.dielectrics);
+export const dielectrics = (names) => grouped(DIELECTRICS, names.dielectrics, pagesOf(names, false));
+
+const pagesOf = (names, opaque) => Object.entries(names.pages).filter(([, page]) => page.opaque === opaque);
 
 /** The option of a menu for a chosen `name` that none of its groups has, as a list. */
 export function chosen(name, groups) {

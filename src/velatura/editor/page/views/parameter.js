@@ -1,8 +1,8 @@
 // A parameter of a layer: its name, the control for its kind, and its alternatives.
 
 import { html, nothing } from 'lit-html';
-import { axes, enabled, indices, isOpaque, variantOf } from '../state/material.js';
-import { setPhase, setValue } from '../state/commands.js';
+import { axes, enabled, indices, isOpaque, metalOf, pageOf, variantOf } from '../state/material.js';
+import { setMetal, setPhase, setValue } from '../state/commands.js';
 import { channelsOf, colour, tint } from './colour.js';
 import { dial, iconButton, menu, number, numberField, texture } from './controls.js';
 import { films } from './films.js';
@@ -27,7 +27,7 @@ const SPANS = { eta: [1, 4], k: [0, 10] }; // where sliders for indices end; fie
 const PLAIN = { number: 0, pair: 0.1, angle: 0, colour: 0.5, index: 1.5 }; // in place of a texture
 
 const isTexture = (value) => value?.texture !== undefined;
-const fileOf = (value) => value?.spectrum ?? value?.refractiveindex;
+const fileOf = (value) => value?.spectrum ?? pageOf(value);
 const isMeasured = (value) => fileOf(value) !== undefined;
 const isBrushing = (value) => value?.brushing !== undefined;
 
@@ -65,7 +65,8 @@ const standards = (schema) => Object.fromEntries(Object.entries(schema).map(([ke
 export function parameter(services, layer, key) {
   const spec = services.session.schema[layer.kind][key];
   const value = layer.keys[key] ?? spec.default;
-  const act = (next) => [setValue, layer.id, key, next];
+  const { names } = services.session;
+  const act = (next) => (key === 'conductor' ? [setMetal, layer.id, next, names] : [setValue, layer.id, key, next]);
   return row(services, { layer, key, label: '', value, spec, act });
 }
 
@@ -107,8 +108,8 @@ const FORMS = {
   angle,
   phase,
   films: (context) => films({ ...context, row: (given) => row(context.services, given) }),
-  choice: ({ services, label, value, edit }) => {
-    const groups = metals(services.session.names);
+  choice: ({ services, layer, label, edit }) => {
+    const groups = metals(services.session.names), value = metalOf(layer.keys);
     const options = [...chosen(value, groups), ...groups];
     return { control: menu({ label, value, options, choose: edit.set }), extras: nothing };
   },
@@ -141,20 +142,24 @@ function channelsMenu(context) {
   return menu({ label: `${label} by`, value: several ? (spaceOf(context) ? 'hsv' : 'rgb') : 'grey', options, choose });
 }
 
-/** An index: a name of a measured material, or numbers. */
+/** An index: a name of a measured material, a page of refractiveindex.info, or numbers. */
 function index(context) {
   const { services, layer, key, label, value, edit } = context;
-  if (isTexture(value)) return textured(context);
-  if (isMeasured(value)) return measured(context);
   const { names } = services.session;
-  const named = typeof value === 'string';
+  const page = pageOf(value);
+  const known = Object.hasOwn(names.pages, page ?? '');
+  if (isTexture(value)) return textured(context);
+  if (isMeasured(value) && !known) return measured(context);
+  const named = typeof value === 'string' || known;
   const groups = [
     ...(variantOf(layer) === 'custom' ? metals(names) : []),
     ...(key === 'eta' ? dielectrics(names) : []),
   ];
-  const options = [['', 'By number'], ...chosen(named && value, groups), ...groups];
-  const choose = (name) => edit.set(name || plainIndex(indices(value, key, names)));
-  const menuOf = menu({ label: `${label}, by name`, value: named ? value : '', options, choose });
+  const name = known ? page : named ? value : '';
+  const options = [['', 'By number'], ...chosen(name, groups), ...groups];
+  const written = (choice) => (Object.hasOwn(names.pages, choice) ? { refractiveindex: choice } : choice);
+  const choose = (choice) => edit.set(written(choice) || plainIndex(indices(value, key, names)));
+  const menuOf = menu({ label: `${label}, by name`, value: name, options, choose });
   const numbers = named ? { control: nothing, extras: textureButton(context) } : simple(context, colour);
   return { control: html`${menuOf}${numbers.control}`, extras: numbers.extras };
 }
