@@ -84,6 +84,15 @@ def test_a_setting_changes_the_answer(run: Run) -> None:
     assert json.loads(out)["reflected"][0]["alpha"] == [pytest.approx([0.25, 0.25])]
 
 
+def test_a_setting_may_be_a_page_of_refractiveindex_info(run: Run) -> None:
+    """Expected: titanium below the coat, in the place of gold."""
+    page = "main/Ti/Johnson"
+    _, out, _ = run("lobes", "coated-gold", "--set", f"layer2_eta={page}", "--json")
+    index = vt.Substance(refractiveindex=page)
+    expected = vt.lobes(vt.preset("coated-gold").replace(layer2_eta=index), [1.0]).energy[1]
+    assert json.loads(out)["reflected"][1]["energy"][0] == pytest.approx(expected[:, 0], abs=1e-6)
+
+
 @pytest.mark.parametrize("name", ["picture.png", "picture.exr"])
 def test_render_writes_one_picture_and_nothing_else(
     run: Run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, name: str
@@ -132,6 +141,8 @@ def test_presets_and_schema(run: Run) -> None:
         (["lobes", "coated-gold", "--set", "tir=sometimes"], ["tir", "sometimes", "published"]),
         (["lobes", "coated-gold", "--set", "reflectanse=fgd"], ["reflectanse", "reflectance"]),
         (["lobes", "coated-gold", "--set", "layer0_alpha=2"], ["alpha", "2"]),
+        (["lobes", "coated-gold", "--set", "layer2_eta=main/Au/Jonson"], ["layer 2", "eta", "main/Au/Johnson"]),
+        (["lobes", "coated-gold", "--set", "layer2_conductor=main/Au/Johnson"], ["conductor", "eta: {refractiveindex"]),
         (["lobes", "coated-gould"], ["coated-gould", "coated-gold"]),
         (["lobes", "broken.yaml"], ["broken.yaml"]),
         (["lobes", "empty.yaml"], ["empty.yaml", "layers"]),

@@ -87,7 +87,7 @@ def read(material: str, settings: list[str] | None) -> tuple[Stack, dict[str, An
         if key in SWITCHES:
             switches[key] = value
         elif _of_layer(key) or key in others:
-            parameters[key] = _value(value)
+            parameters[key] = _page(key, value) or _value(value)
         else:
             raise InvalidInput(f"--set {key}: {unknown('key', key, others)}")
     return stack.replace(**parameters) if parameters else stack, switches
@@ -124,6 +124,14 @@ def _pair(setting: str) -> tuple[str, str]:
 
 def _of_layer(key: str) -> bool:
     return key.startswith("layer")
+
+
+def _page(key: str, text: str) -> dict[str, str] | None:
+    """The page of refractiveindex.info that an index is read from; None of other values."""
+    from velatura.stack.substances import is_path
+
+    is_page = key.endswith(("_eta", "_k")) and ("/" in text or is_path(text))
+    return {"refractiveindex": text} if is_page else None
 
 
 def _value(text: str) -> Any:

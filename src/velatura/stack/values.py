@@ -152,7 +152,7 @@ class Conductor(Parameter):
     def check(self, value: Any) -> str | None:
         if value is None:
             return None
-        if isinstance(value, Mapping | Substance):
+        if isinstance(value, Mapping | Substance) or (isinstance(value, str) and "/" in value):
             raise ValueError(f"must be {self.what}; or write eta: {{refractiveindex: shelf/book/page}}")
         if not isinstance(value, str):
             raise self.refuse(value)
