@@ -15,7 +15,13 @@ const SESSION = {
       alpha: { kind: 'pair', default: 0 },
       sheen: { kind: 'number', default: 0.5 },
     },
-    medium: { depth: { kind: 'number', default: 1 }, g: { kind: 'number', default: 0 }, phase: { kind: 'phase', default: null } },
+    medium: {
+      depth: { kind: 'number', default: 1 },
+      sigma_a: { kind: 'colour', default: 0 },
+      g: { kind: 'number', default: 0 },
+      phase: { kind: 'phase', default: null },
+      pigments: { kind: 'pigments', default: [] },
+    },
     velvet: { fuzz: { kind: 'colour', default: 0 }, weave: { kind: 'choice', default: 'plain' } },
   },
 };
@@ -40,9 +46,10 @@ test('a parameter, and a kind of layer, is known by being declared', () => {
   assert.deepEqual(valuesOf('velvet', { fuzz: [1, 2, 3] }), { exterior: 1, layer0_fuzz: [1, 2, 3] });
 });
 
-test('the asymmetry of a phase function is left to Python', () => {
-  assert.deepEqual(valuesOf('medium', {}), { exterior: 1, layer0_depth: 1, layer0_g: 0 });
-  assert.deepEqual(valuesOf('medium', { phase: 'rayleigh' }), { exterior: 1, layer0_depth: 1 });
+test('what follows from a phase function and from pigments is left to Python', () => {
+  assert.deepEqual(valuesOf('medium', {}), { exterior: 1, layer0_depth: 1, layer0_sigma_a: 0, layer0_g: 0 });
+  assert.deepEqual(valuesOf('medium', { phase: 'rayleigh' }), { exterior: 1, layer0_depth: 1, layer0_sigma_a: 0 });
+  assert.deepEqual(valuesOf('medium', { pigments: [{ K: 1, S: 2 }] }), { exterior: 1, layer0_depth: 1, layer0_g: 0 });
 });
 
 test('what varies over the surface is left out', () => {

@@ -393,7 +393,7 @@ def test_the_schema_knows_every_key_and_range() -> None:
     }
     assert {entry: set(keys) for entry, keys in layers.items()} == {
         "interface": {"eta", "k", "conductor", "alpha", "rotation", "films"},
-        "medium": {"depth", "sigma_a", "sigma_s", "g", "phase"},
+        "medium": {"depth", "sigma_a", "sigma_s", "g", "phase", "pigments"},
         "diffuse": {"albedo"},
     }
     assert set(schema["properties"]) == {"name", "source", "exterior", "thin", "layers"}

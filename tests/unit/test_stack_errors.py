@@ -297,7 +297,10 @@ def test_a_path_that_cannot_be_written_gets_one_line(
             {"layer0_k": 1},
             "layer0_k: layer 0 (dielectric) has no k, only eta, alpha, alpha_u, alpha_v, rotation, films",
         ),
-        ({"layer1_eta": 1}, "layer1_eta: layer 1 (medium) has no eta, only depth, sigma_a, sigma_s, g, phase"),
+        (
+            {"layer1_eta": 1},
+            "layer1_eta: layer 1 (medium) has no eta, only depth, sigma_a, sigma_s, g, phase, pigments",
+        ),
         ({"layer3_eta": 1}, "layer3_eta: the last layer is layer 2"),
         ({"layer_0_eta": 1}, "unknown parameter 'layer_0_eta' (did you mean layer0_eta?)"),
         ({"exteror": 1}, "unknown parameter 'exteror' (did you mean exterior?)"),

@@ -52,6 +52,7 @@ from velatura.stack import (
 )
 from velatura.stack.layers import LAYERS, LayerRecord, has
 from velatura.stack.phases import Phase
+from velatura.stack.pigments import Pigments
 from velatura.stack.schema import Parameter, Record, parameters, unknown
 from velatura.stack.spectra import MIRROR
 from velatura.stack.values import (
@@ -82,6 +83,7 @@ KINDS: dict[type[Parameter], str] = {
     Films: "films",
     Conductor: "choice",
     Phase: "phase",
+    Pigments: "pigments",
     Flag: "flag",
     Text: "text",
 }

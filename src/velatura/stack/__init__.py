@@ -20,6 +20,7 @@ from velatura.stack.layers import (
     Value,
 )
 from velatura.stack.material import Material, as_described, number
+from velatura.stack.pigments import Pigment
 from velatura.stack.spectra import (
     Measured,
     MeasuredIndex,
@@ -55,6 +56,7 @@ __all__ = [
     "Medium",
     "MediumValues",
     "Named",
+    "Pigment",
     "SlabValues",
     "Spectrum",
     "Stack",

@@ -6,6 +6,7 @@ from typing import Any
 
 from velatura.stack.layers import LAYERS
 from velatura.stack.phases import RECORDS
+from velatura.stack.pigments import Pigment
 from velatura.stack.schema import Parameter, Record, parameters
 from velatura.stack.stack import Stack
 from velatura.stack.values import Brushing, Film, Spectrum, Substance, Texture
@@ -27,6 +28,7 @@ def json_schema() -> dict[str, Any]:
             "texture": {**_keys(Texture), "required": ["texture"]},
             "brushing": {**_keys(Brushing), "required": ["brushing"]},
             "film": {**_keys(Film), "required": ["eta", "thickness_nm"]},
+            "pigment": _keys(Pigment),
             **{name: {**_keys(record), "required": _required(record)} for name, record in RECORDS.items()},
         },
     }
@@ -46,6 +48,7 @@ def parameter_table() -> str:
         "texture": Texture,
         "brushing": Brushing,
         "film": Film,
+        "pigment": Pigment,
         **RECORDS,
     }
     for where, model in models.items():

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from velatura.errors import InvalidInput, within
-from velatura.stack.layers import EXTERIOR, KINDS, LAYERS, PERFECT, film_key, has
+from velatura.stack.layers import COEFFICIENTS, EXTERIOR, KINDS, LAYERS, PERFECT, Medium, film_key, has
 from velatura.stack.schema import parameters, unknown
 from velatura.stack.spectra import MIRROR, Measured, Named
 from velatura.stack.values import RGB, Colour, Film, Scalar, Substance, Varying
@@ -207,6 +207,14 @@ def _merged(old: Mapping[str, Any], new: Mapping[str, Any]) -> dict[str, Any]:
     for one, other in (("phase", "g"), ("g", "phase")):
         if one in new and other not in new:
             fields.pop(other, None)
+
+    # Let pigments replace what follows from them, and a part of that the pigments
+    if "pigments" in new:
+        fields = {key: value for key, value in fields.items() if key in new or key not in COEFFICIENTS}
+    elif old.get("pigments") and any(key in new for key in COEFFICIENTS):
+        mixed = Medium.from_dict(old)
+        fields = {**{key: mixed.written(key) for key in COEFFICIENTS}, **fields}
+        fields.pop("pigments")
 
     # Let an axis replace its part of alpha
     if "alpha_u" in new or "alpha_v" in new:

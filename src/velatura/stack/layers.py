@@ -15,6 +15,7 @@ from pydantic import model_validator
 
 from velatura.errors import within
 from velatura.stack.phases import Phase, PhaseRecord, WrittenPhase, asymmetry
+from velatura.stack.pigments import Pigment, Pigments, coefficients
 from velatura.stack.schema import Parameter, Record, parameters
 from velatura.stack.spectra import MIRROR, Measured, MeasuredIndex, Named, names
 from velatura.stack.values import (
@@ -152,6 +153,9 @@ def _product(a: Any, b: Any) -> Any:
     """The product; a factor that is known to be 0 keeps the other one out of recorded code."""
     return 0.0 if any(isinstance(x, float) and x == 0 for x in (a, b)) else a * b
 
+
+#: Of a medium, which may follow from pigments.
+COEFFICIENTS = "sigma_a", "sigma_s"
 
 #: Indices of a mirror under films, which absorbs less than 1e-6 of light.
 PERFECT = {"eta": 1.0, "k": INDEX_HIGH}
@@ -321,21 +325,38 @@ class Medium(LayerRecord):
         Scalar("mean cosine of the scattering angle (Henyey-Greenstein)", low=-1, high=1, strict=True),
     ] = 0.0
     phase: Annotated[str | PhaseRecord | None, Phase("phase function, in place of g")] = None
+    pigments: Annotated[tuple[Pigment, ...], Pigments("pigments, in place of sigma_a and sigma_s")] = ()
 
     @model_validator(mode="after")
-    def _one_phase_function(self) -> Medium:
+    def _one_way_to_say_it(self) -> Medium:
         if self.phase is not None and self.g != 0:
             raise ValueError("g: not together with phase, which has an asymmetry of its own")
+        if self.pigments:
+            for key in COEFFICIENTS:
+                if getattr(self, key) != 0:
+                    raise ValueError(f"{key}: not together with pigments, which give it")
+            if isinstance(self.g, Texture):
+                raise ValueError("g: must be a number together with pigments, whose sigma_s follows from it")
+            with within("pigments", ValueError):
+                for key, value in zip(COEFFICIENTS, coefficients(self.pigments, self.written("g"))):
+                    with within(key, ValueError):
+                        parameters(Medium)[key].check(value)
         return self
 
     @property
     def lossless(self) -> bool:
         """Whether it absorbs no light."""
-        return self.sigma_a in (0.0, (0.0, 0.0, 0.0))
+        return self.written("sigma_a") in (0.0, (0.0, 0.0, 0.0))
 
     def written(self, key: str) -> Any:
-        """The value of a parameter as written; `g` is the asymmetry of any phase function."""
-        return asymmetry(self.phase) if key == "g" and self.phase is not None else getattr(self, key)
+        """The value of a parameter as written; `g` is the asymmetry of any phase function, and what follows from
+        pigments is worked out."""
+        if key == "g" and self.phase is not None:
+            return asymmetry(self.phase)
+        if key in COEFFICIENTS and self.pigments:
+            sigma_a, sigma_s = coefficients(self.pigments, self.written("g"))
+            return sigma_a if key == "sigma_a" else sigma_s
+        return getattr(self, key)
 
 
 class Diffuse(LayerRecord):

@@ -17,7 +17,7 @@ from velatura.files import content, whole
 from velatura.stack import substances
 from velatura.stack.stack import Stack
 
-KEYS = ("texture", "spectrum", "table", "refractiveindex")  # of paths
+KEYS = ("texture", "spectrum", "table", "refractiveindex", "pigment")  # of paths
 
 
 def rewritten(node: Any, rewrite: Callable[[str], str]) -> Any:

@@ -21,18 +21,13 @@ from velatura.errors import needs
 from velatura.stack import tables
 from velatura.stack.schema import Parameter, Record, unknown
 from velatura.stack.tables import Table
-from velatura.stack.values import File, Scalar
+from velatura.stack.values import LARGEST, Rows, number
 
 RAYLEIGH = "rayleigh"  # of particles that are far smaller than the wavelength
 
 SIZES = 1e-3, 200.0  # parameters of spheres; a greater one has more peaks than a table of some size holds
 ANGLES = 1024  # intervals of a table of Mie's phase function at least
 PER_PEAK = 40  # and for each peak
-MOST_ROWS = 4096  # of a table that is written out
-
-
-#: A number that is the same at all points, without gradients.
-number = functools.partial(Scalar, texturable=False, differentiable=False)
 
 
 class PhaseRecord(Record):
@@ -71,30 +66,6 @@ class TabulatedPhase(PhaseRecord):
         return first / total
 
 
-class Rows(Parameter):
-    """A table: a file, or its rows of an angle and a value."""
-
-    what = f"a file, or a list of 2 to {MOST_ROWS} rows [angle, value]"
-    angle = number("angle", low=0, high=180)
-    value = number("value", low=0)
-
-    def check(self, value: Any) -> Path | tuple[tuple[float, float], ...]:
-        value = value.tolist() if hasattr(value, "tolist") else value
-        if isinstance(value, str | Path):
-            path: Path = File(self.doc).check(value)
-            return path
-        if not isinstance(value, list | tuple) or not 2 <= len(value) <= MOST_ROWS:
-            raise self.refuse(value)
-        if not all(isinstance(row, list | tuple) and len(row) == 2 for row in value):
-            raise self.refuse(value)
-        return tuple((self.angle.check(angle), self.value.check(value)) for angle, value in value)
-
-    def json_schema(self) -> dict[str, Any]:
-        row = {"type": "array", "items": {"type": "number", "minimum": 0}, "minItems": 2, "maxItems": 2}
-        rows = {"type": "array", "items": row, "minItems": 2, "maxItems": MOST_ROWS}
-        return {"anyOf": [{"type": "string"}, rows]}
-
-
 class PhaseTable(TabulatedPhase):
     """A phase function by its values per solid angle, in any unit, at angles in degrees, which ascend.
 
@@ -109,7 +80,12 @@ class PhaseTable(TabulatedPhase):
 
     table: Annotated[
         Path | tuple[tuple[float, float], ...],
-        Rows("value per solid angle, in any unit, over the angle of scattering", unit="degrees"),
+        Rows(
+            "value per solid angle, in any unit, over the angle of scattering",
+            unit="degrees",
+            place=number("angle", low=0, high=180),
+            value=number("value", low=0),
+        ),
     ]
     _read: Table = PrivateAttr()
 
@@ -119,8 +95,8 @@ class PhaseTable(TabulatedPhase):
             where = f"{self.table}: "
             rows = tables.read(self.table, "an angle in degrees", "angles")
             for angle, value in rows:
-                if not (0 <= angle <= 180 and 0 <= value <= Rows.value.high):
-                    raise ValueError(f"{where}angles must lie in 0 to 180, and values in 0 to {Rows.value.high:g}")
+                if not (0 <= angle <= 180 and 0 <= value <= LARGEST):
+                    raise ValueError(f"{where}angles must lie in 0 to 180, and values in 0 to {LARGEST:g}")
             if len(rows) < 2:
                 raise ValueError(f"{where}must hold values at two angles or more")
         else:

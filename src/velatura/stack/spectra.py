@@ -7,9 +7,11 @@ Mitsuba itself is not imported, and NumPy only where a spectrum is read.
 from __future__ import annotations
 
 import functools
+from collections.abc import Sequence
 from dataclasses import dataclass
 from importlib import resources
 from importlib.machinery import PathFinder
+from itertools import pairwise
 from pathlib import Path
 from typing import TYPE_CHECKING, Literal
 
@@ -207,9 +209,19 @@ def read(path: Path) -> Table:
     Raises:
         ValueError: it is none; one line that names the file, without its content.
     """
-    rows = tables.read(path, "a wavelength in nanometres", "wavelengths")
+    return of_rows(tables.read(path, "a wavelength in nanometres", "wavelengths"), str(path))
+
+
+def of_rows(rows: Sequence[Sequence[float]], where: str) -> Table:
+    """The table of rows of a wavelength in nanometres and a value.
+
+    Raises:
+        ValueError: it is none of visible light; one line that begins with `where`.
+    """
+    if any(b[0] <= a[0] for a, b in pairwise(rows)):
+        raise ValueError(f"{where}: wavelengths must ascend")
     if len(rows) < 2 or rows[-1][0] < VISIBLE_NM[0] or rows[0][0] > VISIBLE_NM[1]:
-        raise ValueError(f"{path}: must hold values at two wavelengths or more, in nanometres, of visible light")
+        raise ValueError(f"{where}: must hold values at two wavelengths or more, in nanometres, of visible light")
     wavelengths_nm, values = zip(*rows)
     return wavelengths_nm, values
 

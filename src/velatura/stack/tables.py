@@ -1,4 +1,4 @@
-"""Tables in text files: lines of two numbers, the first ones ascending; what follows # is a comment."""
+"""Tables in text files: lines of numbers, the first ones ascending; what follows # is a comment."""
 
 from __future__ import annotations
 
@@ -14,24 +14,35 @@ Table: TypeAlias = tuple[Sequence[float], Sequence[float]]
 LARGEST = 2**20  # bytes of a file
 
 
-def read(path: Path, first: str, firsts: str) -> list[tuple[float, float]]:
-    """The rows of a file, finite; `first` is what the first column holds, and `firsts` its plural.
+def read(
+    path: Path, first: str, firsts: str, others: Sequence[str] = ("a value",), head: Sequence[str] = ()
+) -> list[tuple[float, ...]]:
+    """The rows of a file, finite.
+
+    Args:
+        first: what the first column holds; `firsts` is its plural.
+        others: what each column after it holds.
+        head: names of the columns, which may stand above them.
 
     Raises:
         ValueError: the file holds no such rows; one line that names the file, without its content.
     """
-    rows: list[tuple[float, float]] = []
+    rows: list[tuple[float, ...]] = []
     for at, line in enumerate(text_of(path, LARGEST).splitlines(), start=1):
         cells = line.partition("#")[0].replace(",", " ").split()
         if not cells:
             continue
+        if not rows and cells == [*head]:
+            continue
         try:
-            place, value = map(number, cells)
+            row = tuple(map(number, cells))
         except ValueError:
-            raise ValueError(f"{path}: line {at}: must be {first} and a value") from None
-        if not (math.isfinite(place) and math.isfinite(value)):
+            row = ()
+        if len(row) != 1 + len(others):
+            raise ValueError(f"{path}: line {at}: must be {', '.join([first, *others[:-1]])} and {others[-1]}")
+        if not all(map(math.isfinite, row)):
             raise ValueError(f"{path}: line {at}: must be finite")
-        if rows and place <= rows[-1][0]:
+        if rows and row[0] <= rows[-1][0]:
             raise ValueError(f"{path}: line {at}: {firsts} must ascend")
-        rows.append((place, value))
+        rows.append(row)
     return rows

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ctypes
+import functools
 import math
 import numbers
 import os
@@ -17,7 +18,7 @@ from pydantic import PrivateAttr, model_validator
 from velatura.errors import InvalidInput, within
 from velatura.stack import substances
 from velatura.stack.schema import Parameter, Record, parameters, show, unknown
-from velatura.stack.spectra import MIRROR, Measured, Named, Table, names, read, rgb, source
+from velatura.stack.spectra import MIRROR, Measured, Named, Table, names, of_rows, read, rgb, source
 
 RGB: TypeAlias = tuple[float, float, float]
 
@@ -307,21 +308,26 @@ class Angle(Scalar):
 class Colour(Scalar):
     """A number for all channels, one for each of red, green and blue, or one for each wavelength of a table.
 
-    What takes no texture takes no table either.
+    What takes no texture takes no table either, unless its type says so.
     """
 
     what = "a number, [r, g, b]"
     channel = "rgb"
 
     @property
+    def spectral(self) -> bool:
+        """Whether it takes tables."""
+        return self.texturable
+
+    @property
     def values(self) -> str:
-        return self.what + (", a spectrum" if self.texturable else "")
+        return self.what + (", a spectrum" if self.spectral else "")
 
     def check(self, value: Any) -> Any:
-        if self.texturable and isinstance(value, Mapping) and "spectrum" in value:
+        if self.spectral and isinstance(value, Mapping) and "spectrum" in value:
             value = Spectrum.from_dict(value)
-        if self.texturable and isinstance(value, Spectrum):
-            self._check_table(value, value.spectrum)
+        if self.spectral and isinstance(value, Spectrum):
+            self._check_table(value, value.spectrum if isinstance(value.spectrum, Path) else "spectrum")
             return value
         return super().check(value)
 
@@ -339,7 +345,7 @@ class Colour(Scalar):
 
     def _forms(self) -> list[dict[str, Any]]:
         (number,) = super()._forms()
-        table = [{"$ref": "#/$defs/spectrum"}] if self.texturable else []
+        table = [{"$ref": "#/$defs/spectrum"}] if self.spectral else []
         return [number, {"type": "array", "items": number, "minItems": 3, "maxItems": 3}, *table]
 
 
@@ -411,22 +417,67 @@ class Pair(Scalar):
         return [number, {"type": "array", "items": entry, "minItems": 2, "maxItems": 2}]
 
 
-class Spectrum(Record, Measured):
-    """A value for every wavelength, read from a table; files and the plugins use it as they do a measured name.
+#: A number that is the same at all points, without gradients.
+number = functools.partial(Scalar, texturable=False, differentiable=False)
 
-    The table is a text of two columns, wavelength in nanometres and value (as Mitsuba's .spd files): ascending, with
-    comments after #. It is read once, when the record is made, and must lie in the range of the parameter.
+MOST_ROWS = 4096  # of a table that is written out
+
+_CELL = number("value")
+
+
+@dataclass(frozen=True)
+class Rows(Parameter):
+    """A table: a file, or its rows of a place and a value."""
+
+    place: Scalar = _CELL
+    value: Scalar = _CELL
+
+    @property
+    def values(self) -> str:
+        return f"a file, or a list of 2 to {MOST_ROWS} rows [{self.place.doc}, {self.value.doc}]"
+
+    def check(self, value: Any) -> Path | tuple[tuple[float, float], ...]:
+        value = value.tolist() if hasattr(value, "tolist") else value
+        if isinstance(value, str | Path):
+            path: Path = File(self.doc).check(value)
+            return path
+        if not isinstance(value, list | tuple) or not 2 <= len(value) <= MOST_ROWS:
+            raise self.refuse(value)
+        if not all(isinstance(row, list | tuple) and len(row) == 2 for row in value):
+            raise self.refuse(value)
+        return tuple((self.place.check(place), self.value.check(value)) for place, value in value)
+
+    def json_schema(self) -> dict[str, Any]:
+        cells = [{"type": "number", "minimum": each.low, "maximum": each.high} for each in (self.place, self.value)]
+        row = {"type": "array", "prefixItems": cells, "items": False, "minItems": 2}
+        rows = {"type": "array", "items": row, "minItems": 2, "maxItems": MOST_ROWS}
+        return {"anyOf": [{"type": "string"}, rows]}
+
+
+class Spectrum(Record, Measured):
+    """A value for every wavelength, by a table; files and the plugins use it as they do a measured name.
+
+    The table is written as rows, or is a text of two columns, wavelength in nanometres and value (as Mitsuba's .spd
+    files), with comments after #. Wavelengths ascend. A file is read once, when the record is made; values must lie in
+    the range of the parameter.
 
     Raises:
-        InvalidInput: no such file, or it holds no such table; one line that names it.
+        InvalidInput: no such file, or there is no such table; one line that names the file.
     """
 
-    spectrum: Annotated[Path, File("table of wavelength (nm) and value, relative to the material file")]
+    spectrum: Annotated[
+        Path | tuple[tuple[float, float], ...],
+        Rows(
+            "table of wavelength (nm) and value; a file is relative to the material file",
+            place=number("wavelength", low=0, high=1e5),
+        ),
+    ]
     _read: Table = PrivateAttr()
 
     @model_validator(mode="after")
     def _read_once(self) -> Spectrum:
-        self._read = read(self.spectrum)
+        rows = self.spectrum
+        self._read = read(rows) if isinstance(rows, Path) else of_rows(rows, "spectrum")
         return self
 
     def table(self) -> Table:

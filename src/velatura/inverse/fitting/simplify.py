@@ -213,7 +213,7 @@ def _merged(media: Sequence[Medium]) -> Medium:
     """One medium of depth 1 with the optical depths of several, clear where there is none, and their phase function,
     or else Henyey and Greenstein's of their mean asymmetry."""
     absorbed, scattered = (
-        np.array([np.broadcast_to(getattr(medium, key), 3) * medium.depth for medium in media]).reshape(-1, 3)
+        np.array([np.broadcast_to(medium.written(key), 3) * medium.depth for medium in media]).reshape(-1, 3)
         for key in ("sigma_a", "sigma_s")
     )
     often = scattered.mean(axis=1)

@@ -45,6 +45,7 @@ function refusal(value, spec, names) {
     return value.length > spec.most ? `must be at most ${spec.most} films` : '';
   }
   if (kind === 'phase') return 'phase functions need Python';
+  if (kind === 'pigments') return 'pigments need Python';
   if (kind === 'choice') return options.includes(value) ? '' : `must be one of ${options.join(', ')}`;
   if (kind === 'index' && Object.hasOwn(names.pages, pageOf(value) ?? '')) return '';
   if (value !== null && typeof value === 'object' && !Array.isArray(value)) return 'textures and spectra need Python';

@@ -75,7 +75,9 @@ export function flat(state, { names, schema }) {
 function numbersOf(keys, parameters, names) {
   const found = Object.entries(parameters).flatMap(([key, { kind, default: standard }]) => {
     const value = keys[key] ?? standard;
-    if (kind === 'films' || (key === 'g' && keys.phase !== undefined)) return []; // that asymmetry Python knows
+    if (kind === 'films' || kind === 'pigments') return [];
+    if (key === 'g' && keys.phase !== undefined) return []; // that asymmetry Python knows
+    if (key.startsWith('sigma_') && keys.pigments !== undefined) return []; // these, too
     if (kind === 'pair') return axes(value).map((one, axis) => [`${key}_${'uv'[axis]}`, one]);
     if (kind !== 'index') return [[key, value]];
     return keys.conductor === 'mirror' ? [] : [[key, indices(keys.conductor ?? value, key, names)]];
@@ -105,6 +107,7 @@ export function pattern(state) {
       .map(([key, value]) => [key, shape(value)]),
     films(keys), // of which code knows no more
     keys.phase ?? 0, // whose asymmetry Python knows
+    keys.pigments ?? 0,
   ]);
   return JSON.stringify([state.thin, layers]);
 }

@@ -19,6 +19,7 @@ const NAMES = {
   sigma_s: 'Scattering',
   g: 'Forward (g)',
   phase: 'Phase function',
+  pigments: 'Pigments',
   albedo: 'Albedo',
   films: 'Thin films',
   thickness_nm: 'Thickness',
@@ -27,7 +28,7 @@ const SPANS = { eta: [1, 4], k: [0, 10] }; // where sliders for indices end; fie
 const PLAIN = { number: 0, pair: 0.1, angle: 0, colour: 0.5, index: 1.5 }; // in place of a texture
 
 const isTexture = (value) => value?.texture !== undefined;
-const fileOf = (value) => value?.spectrum ?? pageOf(value);
+const fileOf = (value) => (Array.isArray(value?.spectrum) ? 'a table' : value?.spectrum ?? pageOf(value));
 const isMeasured = (value) => fileOf(value) !== undefined;
 const isBrushing = (value) => value?.brushing !== undefined;
 
@@ -36,15 +37,21 @@ const INDICES = { dielectric: ['eta'], metal: ['conductor'], custom: ['eta', 'k'
 /** Which parameters a layer shows: of the indices, an interface has those of its kind only. */
 export function parametersOf(layer, schema) {
   const all = Object.keys(schema[layer.kind]);
-  if (layer.kind === 'medium' && layer.keys.phase !== undefined) return all.filter((key) => key !== 'g');
+  if (layer.kind === 'medium') return all.filter((key) => !unseen(layer.keys).includes(key));
   if (layer.kind !== 'interface') return all;
   const hidden = Object.values(INDICES).flat();
   return [...INDICES[variantOf(layer)], ...all.filter((key) => !hidden.includes(key))];
 }
 
-/** The colour of a medium, which is that of its absorption; nothing where an image or a table has it. */
+/** Parameters of a medium that follow from others, and pigments where there are none. */
+function unseen({ phase, pigments }) {
+  return [...(phase === undefined ? [] : ['g']), ...(pigments === undefined ? ['pigments'] : ['sigma_a', 'sigma_s'])];
+}
+
+/** The colour of a medium, which is that of its absorption; nothing where an image, a table or pigments have it. */
 export function tintOf({ store, session, edits }, layer) {
-  const { sigma_a: sigma, depth } = { ...standards(session.schema.medium), ...layer.keys };
+  const { sigma_a: sigma, depth, pigments } = { ...standards(session.schema.medium), ...layer.keys };
+  if (pigments.length) return nothing;
   if (typeof depth !== 'number' || depth <= 0 || typeof sigma !== 'number' && !Array.isArray(sigma)) return nothing;
   const twice = isOpaque(enabled(store.get()).at(-1));
   const label = `Colour ${twice ? 'twice' : 'once'} through`;
@@ -107,6 +114,7 @@ const FORMS = {
   pair,
   angle,
   phase,
+  pigments: ({ value }) => ({ control: html`<span class="file">${value.map(nameOf).join(', ')}</span>`, extras: nothing }),
   films: (context) => films({ ...context, row: (given) => row(context.services, given) }),
   choice: ({ services, layer, label, edit }) => {
     const groups = metals(services.session.names), value = metalOf(layer.keys);
@@ -242,6 +250,9 @@ function kindOf(phase) {
   if (typeof phase !== 'object') return phase;
   return phase.forward !== undefined ? 'two_lobes' : phase.table !== undefined ? 'phase_table' : 'mie';
 }
+
+/** How a pigment is called: by its name, its file, or its place among the others. */
+const nameOf = ({ name, pigment }, place) => name || pigment?.split('/').at(-1) || `pigment ${place}`;
 
 /** A phase function: by g, or another one by its numbers; a table stays as it is. */
 function phase({ services, layer, label, value, edit, records }) {
