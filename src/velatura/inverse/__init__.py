@@ -16,6 +16,7 @@ from velatura.inverse.lobes.interface import Choice, invert_interface
 from velatura.inverse.lobes.pair import Pair, invert_pair
 from velatura.inverse.lobes.partial_stack import Above, Layers
 from velatura.inverse.lobes.target import Fixed, Target, TargetLobe, load_target
+from velatura.inverse.paints import Paint, PigmentFit, fit_pigment, load_reflectances, paint
 from velatura.inverse.reasons import Direction, Infeasible
 from velatura.inverse.solution import Solution
 
@@ -33,7 +34,9 @@ __all__ = [
     "Infeasible",
     "Layers",
     "Other",
+    "Paint",
     "Pair",
+    "PigmentFit",
     "ReflectanceTable",
     "Solution",
     "Target",
@@ -41,14 +44,17 @@ __all__ = [
     "alternatives",
     "coat",
     "fit",
+    "fit_pigment",
     "fit_target",
     "grazing",
     "invert_interface",
     "invert_pair",
     "invert_stack",
+    "load_reflectances",
     "load_table",
     "load_target",
     "on_black",
+    "paint",
     "simplify",
     "smooth_pair",
     "table_of",
