@@ -53,6 +53,7 @@ SMOKE = {
     "memory": "--rounds 1 --steps import",
     "metals": "--metals Cu --coats 2",
     "models": "--rounds 2 --spp 1 --size 8 --models bati2021",
+    "pigments": "--mixtures 3",
     "preparation": "--rounds 2 --presets bare-gold --kinds isotropic",
     "reference": "--part statistics --paths 1000",
     "render": "--rounds 2 --spp 1 --size 8 --count 64 --model bati2021",

@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from benchmarks import benchmark
 
 import velatura as vt
 from velatura.errors import InvalidInput
@@ -37,7 +38,7 @@ ADDING_DOUBLING = np.array(
         (4.293, 0.6, 0.09865, 0.05859),
     ]
 )
-KUBELKA_MUNK = -0.001, 0.0095  # error of its reflectance: from, to (benchmarks/pigments.py)
+BENCHMARK = benchmark("pigments")
 
 
 def paint(pigments: list[dict[str, Any]], **values: Any) -> vt.Stack:
@@ -216,8 +217,8 @@ def test_the_surface_of_saundersons_correction() -> None:
 def test_opaque_paint_reflects_what_adding_doubling_has() -> None:
     for g in np.unique(ADDING_DOUBLING[:, 1]):
         k, _, diffuse, normal = ADDING_DOUBLING[ADDING_DOUBLING[:, 1] == g].T
-        inside, outside = (opaque(k, np.ones_like(k), g, eta) for eta in (1.0, 1.5))
-        np.testing.assert_allclose(inside @ WEIGHTS, diffuse, atol=5e-4)
+        inside, outside = (BENCHMARK.opaque(k, np.ones_like(k), g, eta) for eta in (1.0, 1.5))
+        np.testing.assert_allclose(BENCHMARK.diffuse(inside), diffuse, atol=3e-4)
         np.testing.assert_allclose(outside[:, -1], normal, atol=8e-4)
 
 
@@ -232,34 +233,11 @@ def test_opaque_paint_reflects_what_chandrasekhars_function_gives() -> None:
         step = 1 / (np.sqrt(1 - albedo) + albedo / 2 * (h * mu * weights) @ (1 / (mu[:, None] + mu)))
         h = (h + step) / 2
     exact = 1 - 2 * np.sqrt(1 - albedo[:, 0]) * (h @ (mu * weights))
-    np.testing.assert_allclose(opaque(k, np.ones_like(k), 0.0, 1.0) @ WEIGHTS, exact, atol=3e-4)
+    np.testing.assert_allclose(BENCHMARK.diffuse(BENCHMARK.opaque(k, np.ones_like(k), 0.0)), exact, atol=3e-4)
 
 
-def test_kubelka_and_munks_reflectance_errs_by_what_is_known() -> None:
-    rng = np.random.default_rng(35)
-    pigments = rng.uniform(0.1, 1, (4, 1)) * 10 ** rng.uniform(-3, 0.7, (4, 3)), rng.uniform(0.2, 2, (4, 3))
-    shares = rng.dirichlet(np.ones(4), 10)
-    k, s = (np.ravel(shares @ each) for each in pigments)
-    error = opaque(k, s, 0.0, 1.0) @ WEIGHTS - kubelka_munk.opaque(k, s)
-    assert KUBELKA_MUNK[0] < error.min() and error.max() < KUBELKA_MUNK[1]
-
-
-NODES, WEIGHTS = np.polynomial.legendre.leggauss(8)
-NODES = np.append((NODES + 1) / 2, 1.0)  # cosines, and the normal
-WEIGHTS = np.append(WEIGHTS * NODES[:-1], 0.0)  # of diffuse light
-
-
-def opaque(k: np.ndarray, s: np.ndarray, g: float, eta: float) -> np.ndarray:
-    """Reflectance of opaque paint for light at the nodes, (N, 9), by the energies of `velatura`."""
-    sigma_a, sigma_s = absorption(k), scattering(s, g)
-    found = []
-    for colour in range(0, len(k), 3):
-        at = slice(colour, colour + 3)
-        a, b = (tuple(np.resize(each[at], 3).tolist()) for each in (sigma_a, sigma_s))
-        depth = float(np.max(50 / np.sqrt(3 * sigma_a[at] * (sigma_a[at] + (1 - g) * sigma_s[at]))))
-        stack = vt.Stack(
-            [vt.Interface(eta=eta), vt.Medium(depth=depth, sigma_a=a, sigma_s=b, g=g), vt.Diffuse(albedo=0.0)]
-        )
-        lobes = vt.lobes(stack, NODES)
-        found.append((lobes.energy[0] + lobes.remainder)[: len(k) - colour])
-    return np.concatenate(found)
+def test_kubelka_and_munks_reflectance_of_mixtures_errs_by_what_is_known() -> None:
+    k, s = BENCHMARK.mixtures(100, 35)
+    for g, most in {0.0: 0.0091, 0.8: 0.0075}.items():
+        error = BENCHMARK.diffuse(BENCHMARK.opaque(k, s, g)) - kubelka_munk.opaque(k, s)
+        assert error.min() > 0 and error.max() < most
