@@ -47,6 +47,7 @@ EXAMPLES = (
     "textured",
     "glass",
     "phases",
+    "pigments",
     "polarised",
     "inverse",
     "fit",

@@ -257,6 +257,8 @@ def test_the_code_of_a_page_runs(
                     printed += carry_out(command, page, run)
         elif language == "yaml":
             parse(text, tmp_path)
+        elif language == "csv":
+            (tmp_path / text.splitlines()[0].removeprefix("# ")).write_text(text)
         elif language == "xml" and text.startswith("<?xml"):
             ElementTree.fromstring(text)  # a file that commands of the page read
         elif language == "xml":

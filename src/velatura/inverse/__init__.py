@@ -16,7 +16,7 @@ from velatura.inverse.lobes.interface import Choice, invert_interface
 from velatura.inverse.lobes.pair import Pair, invert_pair
 from velatura.inverse.lobes.partial_stack import Above, Layers
 from velatura.inverse.lobes.target import Fixed, Target, TargetLobe, load_target
-from velatura.inverse.paints import Paint, PigmentFit, fit_pigment, load_reflectances, paint
+from velatura.inverse.paints import Paint, PigmentFit, fit_pigment, load_reflectances, paint, paint_colour
 from velatura.inverse.reasons import Direction, Infeasible
 from velatura.inverse.solution import Solution
 
@@ -55,6 +55,7 @@ __all__ = [
     "load_target",
     "on_black",
     "paint",
+    "paint_colour",
     "simplify",
     "smooth_pair",
     "table_of",

@@ -82,6 +82,23 @@ def reflectance(material: Material, specular: bool = True) -> Array:
     return np.asarray(total[:, 0])
 
 
+def paint_colour(material: MaterialLike, specular: bool = False) -> Array:
+    """The colour of a material under such an instrument, linear sRGB under D65 (3,).
+
+    One with spectra is followed at wavelengths every 10 nm, and not by the colours of its spectra. Without `specular`
+    it is less what the first interface reflects.
+
+    Raises:
+        InvalidInput: a texture, or [r, g, b] beside spectra.
+    """
+    stack = load(material)
+    if not any(isinstance(value, Measured) for value in stack.flat().values()):
+        return np.broadcast_to(reflectance(Material.of(stack), specular), 3).copy()
+    nm, weights = observer()
+    found = reflectance(replace(Material.of(stack, at_wavelengths(nm)), light=nm), specular)
+    return np.asarray(weights @ np.broadcast_to(found, len(nm)))
+
+
 # Coefficients of a pigment -------------------------------------------------------------------------------------------
 
 

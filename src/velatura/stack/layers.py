@@ -120,6 +120,11 @@ class MediumValues(SlabValues):
     def tau_s(self) -> Any:
         return _product(self.sigma_s, self.depth)
 
+    @property
+    def spreads(self) -> bool:
+        """Whether it spreads light over directions, also where its values are textures, which have no product."""
+        return not (is_zero(self.sigma_s) or is_zero(self.depth))
+
 
 class BaseValues(ABC):
     """An ideally diffuse base, as models read it, by its `albedo` (a colour)."""
