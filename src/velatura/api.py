@@ -10,7 +10,7 @@ from velatura.errors import InvalidInput
 from velatura.model.base import SWITCHES, Model
 from velatura.model.lobe_statistics import StackLobes
 from velatura.model.registry import DEFAULT, MODELS, named, stack_lobes
-from velatura.stack import MaterialLike, dumps, load
+from velatura.stack import MaterialLike, dumps, single
 from velatura.stack.schema import unknown
 
 if TYPE_CHECKING:
@@ -69,7 +69,7 @@ def lobes(
         InvalidInput: not a valid material, a cosine outside its range, lists of different lengths, an unknown model or
             switch, or a texture, since lobes are those of one point.
     """
-    return stack_lobes(load(stack), cos_theta, phi, model, **switches)
+    return stack_lobes(single(stack, "lobes"), cos_theta, phi, model, **switches)
 
 
 def bsdf(stack: MaterialLike, model: str | Model = DEFAULT, **switches: Any) -> Any:
@@ -85,7 +85,7 @@ def bsdf(stack: MaterialLike, model: str | Model = DEFAULT, **switches: Any) -> 
     """
     from velatura import kernel
 
-    described = load(stack)
+    described = single(stack, "a BSDF")
     if isinstance(model, str) and model in PLUGINS:
         options = {"type": PLUGINS[model], **switches}
     elif isinstance(model, str) and model not in (known := [each.name for each in MODELS]):
@@ -162,7 +162,7 @@ def check(
 
     subject, turned = "BSDF", None
     if isinstance(material, MaterialLike):
-        material = load(material)
+        material = single(material, "check")
         subject = f"{material.name or 'material'} ({model if isinstance(model, str) else model.name})"
         lossless = lossless or all(layer.lossless for layer in material.layers)
         if other := material.turned(TURN):

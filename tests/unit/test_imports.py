@@ -25,7 +25,7 @@ MAY_IMPORT = {
     "ops": "",
     "kernel": "pictures",
     "pictures": "",
-    "stack": "readers",
+    "stack": "readers ops",
     "optics": "ops",
     "renderer": "stack optics ops kernel",
     "films": "stack optics ops renderer",

@@ -386,9 +386,10 @@ def test_the_numbers_of_the_papers() -> None:
 
 def test_the_schema_knows_every_key_and_range() -> None:
     schema = json_schema()
+    stack = schema["$defs"]["stack"]
     layers = {
         entry: keys["properties"]
-        for option in schema["properties"]["layers"]["items"]["oneOf"]
+        for option in stack["properties"]["layers"]["items"]["oneOf"]
         for entry, keys in option["properties"].items()
     }
     assert {entry: set(keys) for entry, keys in layers.items()} == {
@@ -396,7 +397,7 @@ def test_the_schema_knows_every_key_and_range() -> None:
         "medium": {"depth", "sigma_a", "sigma_s", "g", "phase", "pigments"},
         "diffuse": {"albedo"},
     }
-    assert set(schema["properties"]) == {"name", "source", "exterior", "thin", "layers"}
+    assert set(stack["properties"]) == {"name", "source", "exterior", "thin", "layers"}
     assert layers["interface"]["alpha"]["anyOf"][0] == {"type": "number", "minimum": 0, "maximum": 1}
     assert layers["interface"]["eta"]["anyOf"][0] == {"type": "number", "minimum": 1e-3, "maximum": 1e4}
     assert layers["medium"]["g"]["anyOf"][0] == {"type": "number", "exclusiveMinimum": -1, "exclusiveMaximum": 1}

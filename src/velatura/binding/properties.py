@@ -11,7 +11,7 @@ import numpy as np
 from velatura.binding import textures
 from velatura.binding.textures import BrushedField, Image
 from velatura.errors import InvalidInput
-from velatura.stack import Address, Brushing, Measured, Stack, Texture, addressed, load, loads
+from velatura.stack import Address, Brushing, Measured, Stack, Texture, addressed, load, loads, single
 from velatura.stack.io import foreign
 
 #: The value in the stack in place of a texture object of a plugin, if its parameter declares no typical one.
@@ -39,7 +39,11 @@ def described(mi: Any, properties: Any, options: Collection[str]) -> tuple[Stack
                 stand_ins[name] = _STAND_IN  # to be refused as any unknown name
     numbers = {k: v for k, v in given.items() if not isinstance(v, mi.Object) and k != "material"} | stand_ins
     named = "material" in given
-    stack = _named(mi, str(given["material"])).replace(**numbers) if named else Stack.from_flat(None, numbers)
+    stack = (
+        single(_named(mi, str(given["material"])), "a BSDF").replace(**numbers)
+        if named
+        else Stack.from_flat(None, numbers)
+    )
     return stack, {address: objects.get(address.name, value) for address, value in stack.values()}
 
 

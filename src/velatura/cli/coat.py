@@ -34,9 +34,11 @@ def coat(
 ) -> None:
     """Put a coat on a material, and report the change of its lobes."""
     # Refuse what cannot work before anything slow begins
-    stack, switches = options.read(material, settings)
+    described, switches = options.read(material, settings)
     from velatura import files, inverse
-    from velatura.stack import dumps, save
+    from velatura.stack import dumps, save, single
+
+    stack = single(described, "the inverse")
 
     if output:
         files.check_writable(output, "a material file", invert.ENDINGS)

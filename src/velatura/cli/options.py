@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from rich.console import Console
     from rich.table import Table
 
-    from velatura.stack import Stack
+    from velatura.stack import Described
 
 Material = Annotated[
     str,
@@ -70,8 +70,8 @@ def cell(values: Any) -> str:
     return numbers[0] if len(set(numbers)) == 1 else " ".join(numbers)
 
 
-def read(material: str, settings: list[str] | None) -> tuple[Stack, dict[str, Any]]:
-    """The stack that the user named, and the switches of the model, as `--set` changes them.
+def read(material: str, settings: list[str] | None) -> tuple[Described, dict[str, Any]]:
+    """The material that the user named, and the switches of the model, as `--set` changes them.
 
     Raises `InvalidInput` for a file that is no material, and for a setting that is neither a switch nor a parameter.
     """
@@ -79,8 +79,8 @@ def read(material: str, settings: list[str] | None) -> tuple[Stack, dict[str, An
     from velatura.stack import load
     from velatura.stack.schema import unknown
 
-    stack = load(material)
-    others = [*SWITCHES, *(name for name in stack.flat() if not _of_layer(name)), "thin", "layer0_..."]
+    described: Described = load(material)
+    others = [*SWITCHES, *(name for name in described.flat() if not _of_layer(name)), "thin", "layer0_...", "part0_..."]
     switches: dict[str, Any] = {}
     parameters: dict[str, Any] = {}
     for key, value in map(_pair, settings or ()):
@@ -90,7 +90,7 @@ def read(material: str, settings: list[str] | None) -> tuple[Stack, dict[str, An
             parameters[key] = _page(key, value) or _value(value)
         else:
             raise InvalidInput(f"--set {key}: {unknown('key', key, others)}")
-    return stack.replace(**parameters) if parameters else stack, switches
+    return described.replace(**parameters) if parameters else described, switches
 
 
 def folder(text: str) -> Path:
@@ -123,7 +123,7 @@ def _pair(setting: str) -> tuple[str, str]:
 
 
 def _of_layer(key: str) -> bool:
-    return key.startswith("layer")
+    return key.startswith(("layer", "part"))
 
 
 def _page(key: str, text: str) -> dict[str, str] | None:

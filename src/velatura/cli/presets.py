@@ -5,8 +5,12 @@ from __future__ import annotations
 import json
 from collections.abc import Iterable
 from itertools import groupby
+from typing import TYPE_CHECKING
 
 from velatura.cli import options
+
+if TYPE_CHECKING:
+    from velatura.stack import Described, Kind
 
 
 def presets(as_json: options.Json = False) -> None:
@@ -16,14 +20,24 @@ def presets(as_json: options.Json = False) -> None:
     """
     from velatura import stack
 
-    stacks = {name: stack.preset(name) for name in stack.presets()}
+    materials = {name: stack.preset(name) for name in stack.presets()}
     if as_json:
-        print(json.dumps([{"name": name, "layers": m.kinds, "source": m.source} for name, m in stacks.items()]))
+        listed = {name: (_kinds(material), material.source) for name, material in materials.items()}
+        print(
+            json.dumps(
+                [{"name": name, "layers": sum(kinds, ()), "source": source} for name, (kinds, source) in listed.items()]
+            )
+        )
         return
 
-    width = max(map(len, stacks))
-    for name, material in stacks.items():
-        print(f"{name:{width}}  {_layers(material.kinds)}")
+    width = max(map(len, materials))
+    for name, material in materials.items():
+        print(f"{name:{width}}  {' + '.join(map(_layers, _kinds(material)))}")
+
+
+def _kinds(material: Described) -> list[tuple[Kind, ...]]:
+    """The kinds of layers of every stack."""
+    return [stack.kinds for _, stack in material.leaves()]
 
 
 def _layers(kinds: Iterable[str]) -> str:

@@ -21,9 +21,12 @@ def simplify(
 ) -> None:
     """Find the stack of fewer interfaces closest to a material."""
     # Refuse what cannot work before anything slow begins
-    stack, switches = options.read(material, settings)
+    described, switches = options.read(material, settings)
     from velatura import inverse
     from velatura.inverse.fitting.simplify import compared
+    from velatura.stack import single
+
+    stack = single(described, "simplify")
 
     fit.check(output)
     picture, name = invert.picture(material) if plot else None, Path(material).stem

@@ -16,7 +16,7 @@ from velatura.comparison.result import UNPOLARISED, Account, Comparison
 from velatura.comparison.truth import truth as walked
 from velatura.errors import InvalidInput
 from velatura.model import MODELS, Model, named
-from velatura.stack import MaterialLike, Stack, load
+from velatura.stack import MaterialLike, Stack, single
 
 COSINES = (1.0, 0.7, 0.35)
 PATHS = 3 * 10**6
@@ -61,7 +61,7 @@ def compare(
         MissingTool: LLVM is missing or too old.
     """
     # Refuse what cannot work before anything slow begins
-    described = load(stack)
+    described = single(stack, "compare")
     asked = _every(switches) if models is None else [_model(m, switches) for m in models]
     if microsurface is None:
         microsurface = any(isinstance(m, Model) and m.microsurface for m in asked)

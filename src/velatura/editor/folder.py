@@ -14,7 +14,7 @@ from pathlib import Path
 from velatura.editor.messages import TEXT, Answer, Body, Verb, admitting, document, field, to_write
 from velatura.errors import InvalidInput
 from velatura.files import whole
-from velatura.stack import dumps, load
+from velatura.stack import dumps, single
 from velatura.stack.paths import beside
 
 #: Bytes of the largest file that is read, and of the largest request.
@@ -47,7 +47,7 @@ class Folder:
         Raises:
             InvalidInput: no such material.
         """
-        stack, path = load(material), Path(material).resolve()
+        stack, path = single(material, "the editor"), Path(material).resolve()
         if path.is_file() and path.parent == self.path and path.suffix.lower() in MATERIALS:
             return {**self.opened({"file": path.name}), "file": path.name}
         return {"material": document(stack), "file": None, "version": None}
@@ -66,7 +66,7 @@ class Folder:
         if path.stat().st_size > TEXT:
             raise InvalidInput(f"{path.name}: a material file may have {TEXT >> 10} KiB at most here")
         version = _version(path)
-        return {"material": document(load(os.path.relpath(path))), "version": version}
+        return {"material": document(single(os.path.relpath(path), "the editor")), "version": version}
 
     def saved(self, body: Body) -> Answer:
         """Write a material; Conflict unless the file has the version given, None for a file that is not there."""

@@ -15,7 +15,7 @@ from velatura.editor.messages import Answer, admitted, document, field, material
 from velatura.editor.service import FILES, VERBS
 from velatura.errors import InvalidInput, VelaturaError, needs
 from velatura.model import DEFAULT, SWITCHES, Model, named
-from velatura.stack import MaterialLike, Stack, load
+from velatura.stack import MaterialLike, Stack, single
 from velatura.stack.schema import show, unknown
 
 with needs("notebook"):
@@ -43,7 +43,7 @@ class ReadTrait(traitlets.TraitType):
 
 def _stack(value: Any) -> Stack:
     if isinstance(value, MaterialLike):
-        return load(value)
+        return single(value, "the editor")
     raise InvalidInput(f"stack: must be a Stack, its fields, a file or the name of a preset, got {show(value)}")
 
 

@@ -33,7 +33,7 @@ from velatura.stack import (
     MaterialLike,
     MediumValues,
     Stack,
-    load,
+    single,
 )
 
 KEEP = 64  # partial stacks that are followed
@@ -105,7 +105,7 @@ def coat(
             switch.
         NoSolution: no material keeps any of the appearance; the message names the layer and the constraint.
     """
-    chosen, stack = named(model, **switches), load(stack)
+    chosen, stack = named(model, **switches), single(stack, "the inverse")
     top = Interface(eta=eta, alpha=alpha)
     losses: list[str] = []
     if keep_appearance:

@@ -18,7 +18,7 @@ from velatura.inverse.solution import EFFORTS, Solution, exact, in_closed_form, 
 from velatura.model import DEFAULT, Model, named
 from velatura.model.guards import ALPHA_MIN
 from velatura.model.registry import stack_lobes
-from velatura.stack import Diffuse, MaterialLike, Stack, load
+from velatura.stack import Diffuse, MaterialLike, Stack, single
 
 DRAWS = 4  # times that alternatives are drawn
 GRAZING = (0.5, 0.4, 0.3, 0.2, 0.1)  # cosines at which members of a class may differ
@@ -125,7 +125,7 @@ def on_black(stack: MaterialLike) -> Stack:
     Raises:
         InvalidInput: not a valid material (a stack, a file, or a preset's name).
     """
-    stack = load(stack)
+    stack = single(stack, "the inverse")
     return Stack([*stack.layers, Diffuse(albedo=0.0)], exterior=stack.exterior) if stack.transmits else stack
 
 
@@ -135,4 +135,4 @@ def grazing(stack: MaterialLike, model: str | Model = DEFAULT) -> Array:
     Raises:
         InvalidInput: not a valid material (a stack, a file, or a preset's name), an unknown model, a texture.
     """
-    return np.sum(stack_lobes(load(stack), GRAZING, model=model).energy, axis=0)
+    return np.sum(stack_lobes(single(stack, "the inverse"), GRAZING, model=model).energy, axis=0)

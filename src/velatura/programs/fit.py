@@ -17,7 +17,7 @@ from velatura.programs.parameters import UNIT, Values, complete
 from velatura.programs.program import Bake, Carried, Fitted, Program, Range
 from velatura.programs.sampled import Sampled
 from velatura.programs.textures import carried, means
-from velatura.stack import Material, MaterialLike, load
+from velatura.stack import Material, MaterialLike, single
 from velatura.stack.schema import unknown
 
 FITTED, AZIMUTHS = (1.0, 0.85, 0.6, 0.35), (0.0, 60.0, 120.0)  # cosines of incidence, and degrees where brushed
@@ -46,7 +46,7 @@ def bake(material: MaterialLike, target: str, model: str | Model = DEFAULT, **sw
 
     if target not in TARGETS:
         raise InvalidInput(unknown("target", target, TARGETS))
-    chosen, stack, program = named(model, **switches), load(material), TARGETS[target]
+    chosen, stack, program = named(model, **switches), single(material, "a bake"), TARGETS[target]
     found = means(stack)
     described = Described.of(Material.of(stack.replace(**found)), chosen)
     azimuths = np.radians(AZIMUTHS if described.brushed else AZIMUTHS[:1])
@@ -83,7 +83,7 @@ def bake(material: MaterialLike, target: str, model: str | Model = DEFAULT, **sw
 
 def distribution(made: Bake, material: MaterialLike, cos_theta: Sequence[float]) -> Array:
     """Energies (3, N, bins, bins) of light that a bake of a material reflects, over the projected disc."""
-    stack, chosen = load(material), named(made.model)
+    stack, chosen = single(material, "a bake"), named(made.model)
     stack = stack.replace(**means(stack))
     shown = Sampled.of(Described.of(Material.of(stack), chosen), chosen, directions(cos_theta), COMPARED)
     return shown.distribution(TARGETS[made.target].value(made.values, shown.pair, made.thin))

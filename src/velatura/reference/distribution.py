@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 from velatura.light.square_bins import BINS, grids
 from velatura.optics.directions import directions
 from velatura.reference.batches import trace
-from velatura.stack import MaterialLike, Stack, load
+from velatura.stack import MaterialLike, Stack, single
 
 Array = NDArray[np.floating]
 
@@ -42,7 +42,7 @@ def distribution(
     Raises:
         InvalidInput, MissingTool: as `statistics`.
     """
-    stack = load(stack)
+    stack = single(stack, "a distribution")
     each = [_walked(stack, wi, paths, seed, microsurface, bins, polarised) for wi in directions(cos_theta, phi)]
     reflected, transmitted = (np.stack([pair[side] for pair in each], axis=1) for side in (0, 1))
     return Distribution(reflected, transmitted if stack.transmits else None)

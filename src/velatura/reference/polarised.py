@@ -9,7 +9,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from velatura.optics.directions import directions
 from velatura.reference.batches import Ends, ends, mean_and_error
-from velatura.stack import MaterialLike, load
+from velatura.stack import MaterialLike, single
 
 Array = NDArray[np.floating]
 
@@ -44,7 +44,7 @@ def stokes(
     Raises:
         InvalidInput, MissingTool: as `statistics`.
     """
-    stack = load(stack)
+    stack = single(stack, "Stokes vectors")
     each = (ends(stack, wi, paths, seed, microsurface, polarised=True) for wi in directions(cos_theta, phi))
     columns = [_column(found, len(stack.surfaces)) for found in each]
     value, error = ([np.stack(lobe, axis=-1) for lobe in zip(*(pair[i] for pair in columns))] for i in (0, 1))

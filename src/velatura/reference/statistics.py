@@ -12,7 +12,7 @@ from velatura.optics import fresnel, ggx
 from velatura.optics.directions import directions
 from velatura.reference import roughness
 from velatura.reference.batches import ends, mean_and_error, relative_index
-from velatura.stack import Interface, Layer, MaterialLike, Stack, load
+from velatura.stack import Interface, Layer, MaterialLike, Stack, single
 
 Array = NDArray[np.floating]
 
@@ -84,7 +84,7 @@ def statistics(
             number is needed.
         MissingTool: LLVM is missing or too old; the message names the package to install.
     """
-    stack = load(stack)
+    stack = single(stack, "statistics")
     columns = [_column(stack, wi, paths, seed, microsurface, polarised) for wi in directions(cos_theta, phi)]
     truncated = np.array([lost for _, lost in columns])
     values, errors = (_collect([[pair[i] for pair in lobes] for lobes, _ in columns]) for i in (0, 1))

@@ -22,7 +22,7 @@ from velatura.shader.printers.printer import Field, Printer, Struct
 from velatura.shader.recorder.cost import Cost, cost
 from velatura.shader.recorder.recording import Recording, record
 from velatura.shader.recorder.seen import part
-from velatura.stack import MaterialLike, Texture, load
+from velatura.stack import MaterialLike, Texture, single
 
 PREFIX = "vt"  # of names in code
 _PREFIX = re.compile(r"(?!gl_)[A-Za-z](_?[A-Za-z0-9])*")
@@ -107,7 +107,7 @@ def shader(
     """
     if not _PREFIX.fullmatch(prefix):
         raise InvalidInput(f"prefix: must be letters, digits and single underscores, a letter first, not {prefix!r}")
-    stack = load(stack)
+    stack = single(stack, "shader code")
     recording = record(stack, model, constant, values == "uniforms", baking, **switches)
     baked, read, shown = recording.baked, list(recording.read), recording.shown
     looked_up = {symbol.detail for symbol in recording.symbols if symbol.op in ("texels", "value")}

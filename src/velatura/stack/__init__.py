@@ -2,8 +2,8 @@
 
 from velatura.stack.coatings import refuse as refuse_films
 from velatura.stack.describe import json_schema, parameter_table
-from velatura.stack.flat_names import Address, addressed
-from velatura.stack.io import MaterialLike, dumps, load, loads, preset, presets, save
+from velatura.stack.flat_names import Address
+from velatura.stack.io import MaterialLike, dumps, load, loads, preset, presets, save, single
 from velatura.stack.layers import (
     BaseValues,
     Diffuse,
@@ -20,6 +20,7 @@ from velatura.stack.layers import (
     Value,
 )
 from velatura.stack.material import Material, as_described, number
+from velatura.stack.mix import Described, Mix, Part, addressed
 from velatura.stack.pigments import Pigment
 from velatura.stack.spectra import (
     Measured,
@@ -40,6 +41,7 @@ __all__ = [
     "Address",
     "BaseValues",
     "Brushing",
+    "Described",
     "Diffuse",
     "DiffuseValues",
     "Film",
@@ -55,7 +57,9 @@ __all__ = [
     "MeasuredIndex",
     "Medium",
     "MediumValues",
+    "Mix",
     "Named",
+    "Part",
     "Pigment",
     "SlabValues",
     "Spectrum",
@@ -79,6 +83,7 @@ __all__ = [
     "refuse_films",
     "rgb",
     "save",
+    "single",
     "spectrum",
     "srgb_sensitivity",
     "srgb_weights",

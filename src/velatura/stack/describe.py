@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 from velatura.stack.layers import LAYERS
+from velatura.stack.mix import Mix, Part
 from velatura.stack.phases import RECORDS
 from velatura.stack.pigments import Pigment
 from velatura.stack.schema import Parameter, Record, parameters
@@ -13,16 +14,18 @@ from velatura.stack.values import Brushing, Film, Spectrum, Substance, Texture
 
 
 def json_schema() -> dict[str, Any]:
-    """The JSON Schema (draft 2020-12) of a material file. What only the layers together can break is not in it."""
+    """The JSON Schema (draft 2020-12) of a material file. What only layers or parts together can break is not in it."""
     layers = [{**_object({entry: _keys(model)}), "required": [entry]} for entry, model in LAYERS.items()]
-    material = _keys(Stack)
-    material["properties"]["layers"] = {"type": "array", "minItems": 1, "items": {"oneOf": layers}}
+    stack = _keys(Stack)
+    stack["properties"]["layers"] = {"type": "array", "minItems": 1, "items": {"oneOf": layers}}
     return {
         "$schema": "https://json-schema.org/draft/2020-12/schema",
         "title": "Velatura material",
-        **material,
-        "required": ["layers"],
+        "oneOf": [{"$ref": "#/$defs/stack"}, {"$ref": "#/$defs/mixture"}],
         "$defs": {
+            "stack": {**stack, "required": ["layers"]},
+            "mixture": {**_keys(Mix), "required": _required(Mix)},
+            "part": {**_keys(Part), "required": _required(Part)},
             "spectrum": {**_keys(Spectrum), "required": ["spectrum"]},
             "substance": {**_keys(Substance), "required": ["refractiveindex"]},
             "texture": {**_keys(Texture), "required": ["texture"]},
@@ -42,6 +45,8 @@ def parameter_table() -> str:
     ]
     models: dict[str, type[Record]] = {
         "material": Stack,
+        "mixture": Mix,
+        "part": Part,
         **LAYERS,
         "spectrum": Spectrum,
         "substance": Substance,

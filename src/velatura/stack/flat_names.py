@@ -26,16 +26,19 @@ _OF_FILMS = {key: declared for key, declared in parameters(Film).items() if isin
 
 @dataclass(frozen=True)
 class Address:
-    """Where a value of a stack is: its layer (None for the exterior), its key there, and how it is declared."""
+    """Where a value of a material is: its layer (None for the exterior, or a weight), its key there, its declaration,
+    and the numbers of the parts that it is in, the outermost mixture's first."""
 
     layer: int | None
     key: str
     declared: Scalar
+    parts: tuple[int, ...] = ()
 
     @property
     def name(self) -> str:
         """The flat name."""
-        return self.key if self.layer is None else f"layer{self.layer}_{self.key}"
+        within = "".join(f"part{number}_" for number in self.parts)
+        return within + (self.key if self.layer is None else f"layer{self.layer}_{self.key}")
 
     @property
     def film(self) -> int | None:

@@ -14,7 +14,8 @@ import yaml
 from velatura.errors import InvalidInput
 from velatura.files import budget, text_of, whole
 from velatura.readers import READERS
-from velatura.stack.paths import beside, rewritten
+from velatura.stack.mix import Described, Mix, from_dict
+from velatura.stack.paths import beside, is_preset, rewritten
 from velatura.stack.schema import show, unknown
 from velatura.stack.stack import Stack
 from velatura.stack.text import Dumper, Line, parsed
@@ -24,17 +25,22 @@ _FORMATS = {".yaml": "yaml", ".yml": "yaml", ".json": "json"}
 LARGEST = 2**22  # bytes of a file
 ENDINGS = (*_FORMATS, *READERS)  # of all files that hold a material
 
-#: What names a material wherever one is asked for: a stack, a file, the name of a preset, or what a file would hold.
-#: The mapping is without its types, so that `isinstance` takes it.
-MaterialLike: TypeAlias = Stack | str | Path | Mapping
+#: What names a material wherever one is asked for: a stack, a mixture, a file, the name of a preset, or what a file
+#: would hold. The mapping is without its types, so that `isinstance` takes it.
+MaterialLike: TypeAlias = Stack | Mix | str | Path | Mapping
+
+
+#: The material of a file or a preset: a stack, or a mixture where it holds one. Typed as typeshed does it where callers
+#: mostly know which, so that code for stacks compiles unchanged; what takes no mixture reads by `single`.
+Loaded: TypeAlias = Stack | Any
 
 
 # In ------------------------------------------------------------------------------------------------------------------
 
 
 @budget()
-def load(material: MaterialLike) -> Stack:
-    """The stack in a material file (.yaml, .yml or .json), or the preset of that name; a stack unchanged.
+def load(material: MaterialLike) -> Loaded:
+    """The stack or mixture in a material file (.yaml, .yml or .json), or the preset of that name; either unchanged.
 
     A bare word without an extension is a preset. Paths in a file are relative to it; in a mapping of the keys of one,
     to the current folder. A file of another program (.mtlx, .gltf, .glb, or a scene of Mitsuba, .xml; FILE#NAME for one
@@ -44,26 +50,38 @@ def load(material: MaterialLike) -> Stack:
         InvalidInput: no such file or preset, or its content is not a material, or beyond the budget of `files`; one
             line that names the file.
     """
-    if isinstance(material, Stack):
+    if isinstance(material, Stack | Mix):
         return material
     if isinstance(material, Mapping):
         try:
-            return Stack.from_dict(material)
+            return from_dict(material)
         except RecursionError:
             raise InvalidInput("the material: is nested too deeply") from None
     if not isinstance(material, str | Path):
         shown = show(material)  # type: ignore[unreachable]
-        raise InvalidInput(f"a material must be a stack, a file or the name of a preset, got {shown}")
+        raise InvalidInput(f"a material must be a stack, a mixture, a file or the name of a preset, got {shown}")
     path = Path(material)
-    if str(material) in presets() or (not path.suffix and path.parent == Path() and not os.path.isdir(path)):
+    if str(material) in presets() or (is_preset(str(material)) and not os.path.isdir(path)):
         return preset(str(material))
     if os.path.isdir(path):
         raise InvalidInput(f"{path}: is a folder, not a material file")
     if file := foreign(str(material)):
-        imported: Stack = READERS[Path(file).suffix.lower()](str(material))
+        imported: Loaded = READERS[Path(file).suffix.lower()](str(material))
         return imported
     _format(path, "a material file", ENDINGS)
     return loads(text_of(path, LARGEST), name=str(path), folder=path.parent)
+
+
+def single(material: MaterialLike, what: str) -> Stack:
+    """The stack of a material, for what takes no mixture, as "the inverse".
+
+    Raises:
+        InvalidInput: as `load`, or it is a mixture.
+    """
+    found: Described = load(material)
+    if isinstance(found, Mix):
+        raise InvalidInput(f"{what}: takes a single stack, not a mixture")
+    return found
 
 
 def foreign(material: str) -> str:
@@ -77,8 +95,8 @@ def loads(
     name: str = "material.yaml",
     folder: str | Path = ".",
     find: Callable[[str], str] | None = None,
-) -> Stack:
-    """The stack in a text.
+) -> Loaded:
+    """The stack or mixture in a text.
 
     Args:
         text: YAML, or JSON where `name` ends in .json.
@@ -92,7 +110,7 @@ def loads(
     find = find or (lambda path: str(Path(folder, path)))
     fields = parsed(text, _FORMATS.get(Path(name).suffix.lower(), "yaml"), name)
     try:
-        return Stack.from_dict(rewritten(fields, find))
+        return from_dict(rewritten(fields, find))
     except InvalidInput as error:
         raise InvalidInput(f"{name}: {error}") from None
     except RecursionError:
@@ -110,7 +128,7 @@ def read(path: str | Path, what: str) -> Any:
     return parsed(text_of(path, LARGEST), format, path)
 
 
-def preset(name: str) -> Stack:
+def preset(name: str) -> Loaded:
     """The preset of that name.
 
     Raises:
@@ -130,7 +148,7 @@ def presets() -> tuple[str, ...]:
 # Out -----------------------------------------------------------------------------------------------------------------
 
 
-def save(stack: Stack, path: str | Path) -> None:
+def save(material: Described, path: str | Path) -> None:
     """Write a material file, whole or not at all; paths in it are written relative to it.
 
     Images that no file of the user's holds, such as those inside a .glb, are written beside it.
@@ -142,28 +160,37 @@ def save(stack: Stack, path: str | Path) -> None:
     format = _format(path)
     if not os.path.isdir(path.parent):
         raise InvalidInput(f"{path}: there is no folder {path.parent}")
-    with beside(stack, path.parent) as stack, whole(path) as unfinished:
-        unfinished.write_bytes(dumps(stack, format, path.parent).encode("utf-8"))
+    with beside(material, path.parent) as material, whole(path) as unfinished:
+        unfinished.write_bytes(dumps(material, format, path.parent).encode("utf-8"))
 
 
-def dumps(stack: Stack, format: str = "yaml", folder: str | Path | None = None) -> str:
+def dumps(material: Described, format: str = "yaml", folder: str | Path | None = None) -> str:
     """The text of a material file, `yaml` or `json`, that `loads` reads back exactly.
 
-    Values that equal their default are left out. Paths in it are relative to `folder`, or absolute where it is None.
+    Values that equal their default are left out, and the materials of a mixture are written out. Paths in it are
+    relative to `folder`, or absolute where it is None.
 
     Raises:
         InvalidInput: an unknown format.
     """
-    fields = stack.to_dict()
+    fields = material.to_dict()
     if folder is not None:
         start = Path(folder).resolve()
         fields = rewritten(fields, lambda path: Path(os.path.relpath(path, start)).as_posix())
     if format == "json":
         return json.dumps(fields, indent=2, ensure_ascii=False) + "\n"
     if format == "yaml":
-        fields["layers"] = [{entry: Line(keys) for entry, keys in layer.items()} for layer in fields["layers"]]
-        return yaml.dump(fields, Dumper=Dumper, sort_keys=False, allow_unicode=True, width=float("inf"))
+        return yaml.dump(_in_lines(fields), Dumper=Dumper, sort_keys=False, allow_unicode=True, width=float("inf"))
     raise InvalidInput(unknown("format", format, ("yaml", "json")))
+
+
+def _in_lines(fields: dict[str, Any]) -> dict[str, Any]:
+    """The mapping of a material with its layers on one line each."""
+    if "mix" in fields:
+        parts = [{**part, "material": _in_lines(part["material"])} for part in fields["mix"]]
+        return {**fields, "mix": parts}
+    layers = [{entry: Line(keys) for entry, keys in layer.items()} for layer in fields["layers"]]
+    return {**fields, "layers": layers}
 
 
 def _format(path: Path, what: str = "a material file", endings: Iterable[str] = _FORMATS) -> str:

@@ -10,18 +10,20 @@ import re
 import tempfile
 from collections.abc import Callable, Iterator
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 from velatura.errors import InvalidInput
 from velatura.files import content, whole
 from velatura.stack import substances
-from velatura.stack.stack import Stack
+from velatura.stack.schema import Record
 
-KEYS = ("texture", "spectrum", "table", "refractiveindex", "pigment")  # of paths
+M = TypeVar("M", bound=Record)  # a material
+
+KEYS = ("texture", "spectrum", "table", "refractiveindex", "pigment", "material")  # of paths
 
 
 def rewritten(node: Any, rewrite: Callable[[str], str]) -> Any:
-    """A copy of parsed values in which the path of every texture and table is rewritten."""
+    """A copy of parsed values in which the path of every texture, table and file is rewritten."""
     if isinstance(node, dict):
         return {
             key: rewrite(value) if _is_path(key, value) else rewritten(value, rewrite) for key, value in node.items()
@@ -30,7 +32,16 @@ def rewritten(node: Any, rewrite: Callable[[str], str]) -> Any:
 
 
 def _is_path(key: object, value: object) -> bool:
-    return key in KEYS and isinstance(value, str) and (key != "refractiveindex" or substances.is_path(value))
+    if key not in KEYS or not isinstance(value, str):
+        return False
+    if key == "material":
+        return not is_preset(value)
+    return key != "refractiveindex" or substances.is_path(value)
+
+
+def is_preset(material: str) -> bool:
+    """Whether a material is called by the name of a preset, a bare word without an ending."""
+    return not Path(material).suffix and Path(material).parent == Path()
 
 
 def hold(data: bytes, name: str, ending: str) -> Path:
@@ -46,22 +57,22 @@ def hold(data: bytes, name: str, ending: str) -> Path:
     return path
 
 
-def held(stack: Stack) -> list[str]:
+def held(material: Record) -> list[str]:
     """The paths of the images of a material that `hold` has made."""
     found: list[str] = []
-    rewritten(stack.to_dict(), lambda path: found.append(path) or path)  # type: ignore[func-returns-value]
+    rewritten(material.to_dict(), lambda path: found.append(path) or path)  # type: ignore[func-returns-value]
     return [path for path in dict.fromkeys(found) if Path(path).parent == _folder()]
 
 
 @contextlib.contextmanager
-def beside(stack: Stack, folder: Path) -> Iterator[Stack]:
+def beside(material: M, folder: Path) -> Iterator[M]:
     """A material whose held images have been written into a folder; they are removed again if the block fails.
 
     Raises:
         InvalidInput: an image cannot be written, or another file has its name.
     """
     made: list[Path] = []
-    places = {path: folder.resolve() / Path(path).name for path in held(stack)}
+    places = {path: folder.resolve() / Path(path).name for path in held(material)}
     try:
         for path, place in places.items():
             data = Path(path).read_bytes()
@@ -71,8 +82,8 @@ def beside(stack: Stack, folder: Path) -> Iterator[Stack]:
                 made.append(place)
             elif content(place) != data:
                 raise InvalidInput(f"{place}: is another file than the image of that name, and stays")
-        moved = rewritten(stack.to_dict(), lambda path: str(places.get(path, path)))
-        yield Stack.from_dict(moved) if places else stack
+        moved = rewritten(material.to_dict(), lambda path: str(places.get(path, path)))
+        yield type(material).from_dict(moved) if places else material
     except BaseException:
         for place in made:
             place.unlink(missing_ok=True)

@@ -68,6 +68,18 @@ class Stack(Record):
 
     # Contents -----------------------------------------------------------------------------------------------------
 
+    def leaves(self) -> Iterator[tuple[tuple[int, ...], Stack]]:
+        """The stack alone, which is in no part of a mixture."""
+        yield (), self
+
+    def shares(self, weights: Mapping[str, Any]) -> list[Any]:
+        """The share of the stack in itself, as `Mix.shares`."""
+        return [1.0]
+
+    def weighted(self, refusal: str) -> list[tuple[float, Stack]]:
+        """The stack with its share in itself, as `Mix.weighted`."""
+        return [(1.0, self)]
+
     @property
     def kinds(self) -> tuple[Kind, ...]:
         """dielectric, conductor, mirror, medium or diffuse, for every layer."""

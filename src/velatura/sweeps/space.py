@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from pydantic import model_validator
 
 from velatura.errors import InvalidInput, within
-from velatura.stack import Stack, addressed, load
+from velatura.stack import Stack, addressed, single
 from velatura.stack.schema import Parameter, Record
 from velatura.stack.values import LARGEST, Choice, Flag, Scalar, Whole
 
@@ -71,7 +71,7 @@ class MaterialSource(Parameter):
 
     def check(self, value: Any) -> Stack:
         try:
-            return Stack.from_dict(value) if isinstance(value, Mapping) else load(value)
+            return single(value, "a sweep")
         except InvalidInput as error:
             raise ValueError(str(error)) from None
 

@@ -14,7 +14,7 @@ from velatura.model import Model, named
 from velatura.model.base import Query
 from velatura.model.papers import bsdf, mixture
 from velatura.ops import Value
-from velatura.stack import Material, MaterialLike, load
+from velatura.stack import Material, MaterialLike, single
 
 TILTS = (0.0, *np.geomspace(0.006, 1.6, 10))  # of half-vectors, as slopes: so that every lobe is met, sharp or blurred
 TURNS = 4  # azimuths of half-vectors over half a turn
@@ -143,7 +143,7 @@ def table_of(
     Raises:
         InvalidInput: not a valid material, an unknown model, or a texture, which has no one value.
     """
-    value, energy = read(Material.of(load(stack)), directions, named(model))
+    value, energy = read(Material.of(single(stack, "the inverse")), directions, named(model))
     value = np.broadcast_to(value / directions.wo[2], (3, len(directions.theta_i)))
     return ReflectanceTable(
         directions, value, np.broadcast_to(energy, (3, directions.lit.shape[1])) if with_energy else None

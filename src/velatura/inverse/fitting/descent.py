@@ -36,7 +36,7 @@ from velatura.stack import (
     MediumValues,
     Stack,
     as_described,
-    load,
+    single,
 )
 from velatura.stack.layers import film_key
 from velatura.stack.values import THICKEST_NM
@@ -192,9 +192,10 @@ def descended(
 
     No model stands in for another one where there are films, whose averages take as long as the solution.
     """
-    coated = [start for start in map(load, starts) if any(start.films)]
+    stacks = [single(start, "fit") for start in starts]
+    coated = [start for start in stacks if any(start.films)]
     ends = [Descent(table, start, model, eta_max, darkest, films=films).run(ALONE) for start in coated]
-    bare = [start for start in map(load, starts) if not any(start.films)]
+    bare = [start for start in stacks if not any(start.films)]
     rounds = ROUNDS if model.closed_form else STANDING
     ends += [Descent(table, start, model.surrogate, eta_max, darkest).run(rounds=rounds).of(model) for start in bare]
     ends.sort(key=lambda end: end.cost)

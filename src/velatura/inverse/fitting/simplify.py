@@ -32,7 +32,7 @@ from velatura.stack import (
     Medium,
     Stack,
     as_described,
-    load,
+    single,
 )
 
 STARTS = 4
@@ -103,7 +103,7 @@ def simplify(
     Raises:
         InvalidInput: not a valid material, no such number of interfaces, a texture, an unknown model or switch.
     """
-    chosen, stack = named(model, **switches), load(stack)
+    chosen, stack = named(model, **switches), single(stack, "simplify")
     count = len(stack.interfaces)
     if count == 1:
         raise InvalidInput("interfaces: the material has one, and none can have fewer")

@@ -31,7 +31,7 @@ from velatura.shader.program import described
 from velatura.shader.recorder import recording
 from velatura.shader.recorder.graph import Graph
 from velatura.shader.recorder.symbol import Kind, Operand, Symbol, in_order, operand
-from velatura.stack import Address, Brushing, MaterialLike, Stack, Texture, Varying, load
+from velatura.stack import Address, Brushing, MaterialLike, Stack, Texture, Varying, single
 
 LINE = 116  # characters of comments
 ACROSS = 12  # numbers of an array on a line
@@ -149,7 +149,7 @@ def osl(
     Raises:
         InvalidInput: as `velatura.shader.record`; a thickness of a film that is a texture.
     """
-    stack, asked = load(stack), named(model, **switches)
+    stack, asked = single(stack, "shader code"), named(model, **switches)
     for address, value in stack.values():
         if address.film is not None:
             # A table over thickness, too, would be megabytes of code
