@@ -2,15 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, overload
 
 from velatura.errors import InvalidInput
 from velatura.model.base import SWITCHES, Model
-from velatura.model.lobe_statistics import StackLobes
-from velatura.model.registry import DEFAULT, MODELS, named, stack_lobes
-from velatura.stack import MaterialLike, dumps, single
+from velatura.model.lobe_statistics import MixtureLobes, StackLobes
+from velatura.model.registry import DEFAULT, MODELS, named
+from velatura.model.registry import lobes as material_lobes
+from velatura.stack import MaterialLike, Mix, Stack, dumps, load, single
 from velatura.stack.schema import unknown
 
 if TYPE_CHECKING:
@@ -35,13 +36,35 @@ def register() -> None:
     kernel.register()
 
 
+@overload
+def lobes(
+    stack: Mix, cos_theta: ArrayLike, phi: ArrayLike = 0.0, model: str | Model = DEFAULT, **switches: str
+) -> MixtureLobes: ...
+
+
+@overload
+def lobes(
+    stack: Stack | str | Path | Mapping[str, Any],
+    cos_theta: ArrayLike,
+    phi: ArrayLike = 0.0,
+    model: str | Model = DEFAULT,
+    **switches: str,
+) -> StackLobes: ...
+
+
+@overload
 def lobes(
     stack: MaterialLike, cos_theta: ArrayLike, phi: ArrayLike = 0.0, model: str | Model = DEFAULT, **switches: str
-) -> StackLobes:
+) -> StackLobes | MixtureLobes: ...
+
+
+def lobes(
+    stack: MaterialLike, cos_theta: ArrayLike, phi: ArrayLike = 0.0, model: str | Model = DEFAULT, **switches: str
+) -> StackLobes | MixtureLobes:
     """Energy, covariance and roughness of every lobe of a material (Belcour 2018, section 5), in NumPy.
 
     Args:
-        stack: a material (a stack, a file, or a preset's name).
+        stack: a material (a stack, a mixture, a file, or a preset's name).
         cos_theta: cosines of the directions of incidence, in (0, 1]: a number, or a list of N.
         phi: their azimuths from the tangent, radians: one for all, or N.
         model: a named model or its name, its choices changed by `switches` (`reflectance="fresnel"`, `tir="off"`, ...).
@@ -65,11 +88,14 @@ def lobes(
         - `passed`: (C, N), leaves below;
         - `absorbed`: (C, N), what is left, which for models that lose light holds that, too.
 
+        Of a mixture, lists run over the lobes of all parts, one after the other, with energies times shares; other
+        light is summed up, `transmitted` is a list, and `parts` are the lobes of each stack.
+
     Raises:
         InvalidInput: not a valid material, a cosine outside its range, lists of different lengths, an unknown model or
             switch, or a texture, since lobes are those of one point.
     """
-    return stack_lobes(single(stack, "lobes"), cos_theta, phi, model, **switches)
+    return material_lobes(load(stack), cos_theta, phi, model, **switches)
 
 
 def bsdf(stack: MaterialLike, model: str | Model = DEFAULT, **switches: Any) -> Any:

@@ -222,3 +222,39 @@ def test_what_takes_a_single_stack_refuses_a_mixture_in_one_line() -> None:
     with pytest.raises(vt.InvalidInput, match=r"^the inverse: takes a single stack, not a mixture$"):
         vt.inverse.coat(WORN)
     assert single("bare-gold", "") == vt.preset("bare-gold")
+
+
+# Lobes ---------------------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("model", [model.name for model in vt.MODELS])
+def test_lobes_are_those_of_the_parts_with_energies_times_their_shares(model: str) -> None:
+    glass = vt.Stack([vt.Interface(eta=1.5, alpha=0.2)])
+    mix = vt.Mix([(0.3, PAINT), (0.25, glass), (None, vt.Mix([(0.4, METAL), (None, glass)]))])
+    cosines = [1.0, 0.4]
+    found, parts = vt.lobes(mix, cosines, model=model), [vt.lobes(s, cosines, model=model) for _, s in mix.leaves()]
+    shares = [0.3, 0.25, (1 - 0.55) * 0.4, (1 - 0.55) * 0.6]
+    assert np.allclose(shares, [share for share, _ in mix.weighted("")], rtol=0, atol=1e-15)
+    lobes = [(share, part, k) for share, part in zip(shares, parts) for k in range(len(part.energy))]
+    assert len(found.energy) == len(lobes) and len(found.transmitted) == 2
+    for k, (share, part, own) in enumerate(lobes):
+        assert np.allclose(found.energy[k], share * part.energy[own], rtol=1e-14, atol=0)
+        assert np.array_equal(found.alpha[k], part.alpha[own], equal_nan=True)
+        assert np.array_equal(found.covariance[k], part.covariance[own], equal_nan=True)
+    for name in ("remainder", "passed", "absorbed"):
+        each = [share * getattr(part, name) for share, part in zip(shares, parts)]
+        assert np.allclose(getattr(found, name), np.sum(each, axis=0), rtol=1e-14, atol=0)
+    assert np.allclose(sum(found.energy) + found.remainder + found.passed + found.absorbed, 1, atol=1e-6)
+
+
+def test_lobes_on_the_command_line_are_named_by_their_parts(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    from velatura.cli import lobes
+
+    vt.save(WORN, tmp_path / "worn.yaml")
+    lobes.lobes(str(tmp_path / "worn.yaml"), cos="1,0.5", settings=["part0_weight=0.2", "part1_layer0_alpha=0.2"])
+    text = capsys.readouterr().out
+    assert "part0 R1" in text and "part1 R1" in text and "remainder" in text
+    lobes.lobes(str(tmp_path / "worn.yaml"), settings=["part0_weight=0.2"], as_json=True)
+    found = json.loads(capsys.readouterr().out)
+    assert found["transmitted"] == [] and len(found["reflected"]) == 2
+    assert np.allclose(np.array(found["reflected"][1]["energy"]).T, 0.8 * vt.lobes(METAL, 1.0).energy[0])

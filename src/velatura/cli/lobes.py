@@ -13,6 +13,8 @@ from velatura.cli import options
 if TYPE_CHECKING:
     from rich.table import Table
 
+    from velatura.model.lobe_statistics import LobeStatistics
+
 # A lobe's quantities in the order of the JSON, and whether their components (rgb, uv, ...) stand before the directions.
 FIELDS = {
     "energy": True,
@@ -38,23 +40,34 @@ def lobes(
 ) -> None:
     """Print the lobes of a material: energy, roughness, rotation."""
     cosines = options.cosines(cos)
-    stack, switches = options.read(material, settings)
+    described, switches = options.read(material, settings)
     import velatura
 
     name = options.model_name(model)
-    found = velatura.lobes(stack, cos_theta=cosines, phi=math.radians(phi), model=name, **switches)
-    below = found.transmitted
-    reflected = [{field: getattr(found, field)[k] for field in FIELDS} for k in range(len(found.energy))]
-    transmitted = below and {field: getattr(below, field) for field in FIELDS}
+    found = velatura.lobes(described, cos_theta=cosines, phi=math.radians(phi), model=name, **switches)
 
     if as_json:
-        report = {"model": name, "cos": cosines, "reflected": [_plain(lobe) for lobe in reflected]}
-        others = {name: getattr(found, name).T.tolist() for name in OTHER_LIGHT}
-        print(json.dumps(report | {"transmitted": transmitted and _plain(transmitted)} | others, allow_nan=False))
+        reflected = [_plain({field: getattr(found, field)[k] for field in FIELDS}) for k in range(len(found.energy))]
+        below = [_plain(_fields(part.transmitted)) for part in found.parts if part.transmitted]
+        transmitted = below if isinstance(found.transmitted, list) else next(iter(below), None)
+        report = {"model": name, "cos": cosines, "reflected": reflected, "transmitted": transmitted}
+        print(json.dumps(report | {name: getattr(found, name).T.tolist() for name in OTHER_LIGHT}, allow_nan=False))
     else:
-        named = {f"R{k}": lobe for k, lobe in enumerate(reflected, 1)} | ({"T": transmitted} if transmitted else {})
-        others = {other: getattr(found, other) for other in OTHER_LIGHT if not (transmitted and other == "passed")}
-        options.console().print(_table(f"{stack.name or material} ({name})", cosines, named, others))
+        named: dict[str, dict[str, Any]] = {}
+        for (path, _), part in zip(described.leaves(), found.parts):
+            within = "".join(f"part{number} " for number in path)
+            for k in range(len(part.energy)):
+                named[f"{within}R{k + 1}"] = {field: getattr(part, field)[k] for field in FIELDS}
+            if part.transmitted:
+                named[f"{within}T"] = _fields(part.transmitted)
+        others = {
+            other: getattr(found, other) for other in OTHER_LIGHT if not (found.transmitted and other == "passed")
+        }
+        options.console().print(_table(f"{described.name or material} ({name})", cosines, named, others))
+
+
+def _fields(lobe: LobeStatistics) -> dict[str, Any]:
+    return {field: getattr(lobe, field) for field in FIELDS}
 
 
 def _plain(lobe: dict[str, Any]) -> dict[str, Any]:
@@ -63,8 +76,8 @@ def _plain(lobe: dict[str, Any]) -> dict[str, Any]:
 
 
 def _table(title: str, cosines: list[float], lobes: dict[str, dict[str, Any]], others: dict[str, Any]) -> Table:
-    """A row per direction and lobe: R1 is the first interface from the top, T what leaves below; then all other light
-    by name."""
+    """A row per direction and lobe: R1 is the first interface from the top, T what leaves below, in a mixture after
+    their part; then all other light by name."""
     table = options.table(title, ["cos", "lobe"], ["energy", "alpha", "rotation"])
     for i, cosine in enumerate(cosines):
         for name, lobe in lobes.items():

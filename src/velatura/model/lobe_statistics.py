@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -60,6 +60,77 @@ class StackLobes:
         left = 1 - remainder - passed - sum(lobe.energy for lobe in reflected)
         lists = {field.name: [getattr(lobe, field.name) for lobe in reflected] for field in fields(LobeStatistics)}
         return cls(**lists, transmitted=transmitted, remainder=remainder, passed=passed, absorbed=np.maximum(left, 0))
+
+    @property
+    def parts(self) -> list[StackLobes]:
+        """These lobes alone, as those of a mixture with one part."""
+        return [self]
+
+    def times(self, share: float) -> StackLobes:
+        """The same lobes with a share of the light."""
+        below = self.transmitted
+        return replace(
+            self,
+            energy=[share * energy for energy in self.energy],
+            transmitted=below and replace(below, energy=share * below.energy),
+            remainder=share * self.remainder,
+            passed=share * self.passed,
+            absorbed=share * self.absorbed,
+        )
+
+
+@dataclass(frozen=True)
+class MixtureLobes:
+    """The lobes of all stacks of a mixture, in `parts`, with energies times the shares of these.
+
+    Lists run over the reflected lobes of all parts, one after the other, and `transmitted` over parts that transmit;
+    remainder, passed and absorbed (C, N) are sums.
+    """
+
+    parts: list[StackLobes]
+
+    @property
+    def energy(self) -> list[np.ndarray]:
+        return self._each("energy")
+
+    @property
+    def covariance(self) -> list[np.ndarray]:
+        return self._each("covariance")
+
+    @property
+    def alpha(self) -> list[np.ndarray]:
+        return self._each("alpha")
+
+    @property
+    def rotation(self) -> list[np.ndarray]:
+        return self._each("rotation")
+
+    @property
+    def own_alpha(self) -> list[np.ndarray]:
+        return self._each("own_alpha")
+
+    @property
+    def own_rotation(self) -> list[np.ndarray]:
+        return self._each("own_rotation")
+
+    @property
+    def transmitted(self) -> list[LobeStatistics]:
+        return [part.transmitted for part in self.parts if part.transmitted]
+
+    @property
+    def remainder(self) -> np.ndarray:
+        return np.sum([part.remainder for part in self.parts], axis=0)
+
+    @property
+    def passed(self) -> np.ndarray:
+        return np.sum([part.passed for part in self.parts], axis=0)
+
+    @property
+    def absorbed(self) -> np.ndarray:
+        return np.sum([part.absorbed for part in self.parts], axis=0)
+
+    def _each(self, name: str) -> list[np.ndarray]:
+        return [lobe for part in self.parts for lobe in getattr(part, name)]
 
 
 def nearer_axis(material: Material, isotropic: np.ndarray) -> np.ndarray:

@@ -6,11 +6,11 @@ from numpy.typing import ArrayLike
 
 from velatura.errors import InvalidInput
 from velatura.model.base import Model
-from velatura.model.lobe_statistics import StackLobes
+from velatura.model.lobe_statistics import MixtureLobes, StackLobes
 from velatura.model.papers.model import PaperModel
 from velatura.model.solved.model import SolvedModel
 from velatura.optics.directions import directions
-from velatura.stack import Material, Stack
+from velatura.stack import Described, Material, Mix, Stack
 from velatura.stack.schema import unknown
 
 MODELS: tuple[Model, ...] = (
@@ -79,3 +79,17 @@ def stack_lobes(
     chosen = named(model, **switches)
     x, y, z = directions(cos_theta, phi).T
     return chosen.statistics(Material.of(stack).solid(), (x, y, z))
+
+
+def lobes(
+    material: Described,
+    cos_theta: ArrayLike,
+    phi: ArrayLike = 0.0,
+    model: str | Model = DEFAULT,
+    **switches: str,
+) -> StackLobes | MixtureLobes:
+    """The lobes of a stack or a mixture; see `velatura.lobes`."""
+    if not isinstance(material, Mix):
+        return stack_lobes(material, cos_theta, phi, model, **switches)
+    shares = material.weighted("lobes are those of one point; replace it, as in --set part0_weight=0.5")
+    return MixtureLobes([stack_lobes(stack, cos_theta, phi, model, **switches).times(share) for share, stack in shares])
