@@ -2,16 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Mapping, Sequence
+from collections.abc import Callable, Collection, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, overload
+from typing import TYPE_CHECKING, Any
 
 from velatura.errors import InvalidInput
 from velatura.model.base import SWITCHES, Model
-from velatura.model.lobe_statistics import MixtureLobes, StackLobes
+from velatura.model.lobe_statistics import StackLobes
 from velatura.model.registry import DEFAULT, MODELS, named
 from velatura.model.registry import lobes as material_lobes
-from velatura.stack import MaterialLike, Mix, Stack, dumps, load, single
+from velatura.stack import MaterialLike, dumps, load
 from velatura.stack.schema import unknown
 
 if TYPE_CHECKING:
@@ -36,31 +36,9 @@ def register() -> None:
     kernel.register()
 
 
-@overload
-def lobes(
-    stack: Mix, cos_theta: ArrayLike, phi: ArrayLike = 0.0, model: str | Model = DEFAULT, **switches: str
-) -> MixtureLobes: ...
-
-
-@overload
-def lobes(
-    stack: Stack | str | Path | Mapping[str, Any],
-    cos_theta: ArrayLike,
-    phi: ArrayLike = 0.0,
-    model: str | Model = DEFAULT,
-    **switches: str,
-) -> StackLobes: ...
-
-
-@overload
 def lobes(
     stack: MaterialLike, cos_theta: ArrayLike, phi: ArrayLike = 0.0, model: str | Model = DEFAULT, **switches: str
-) -> StackLobes | MixtureLobes: ...
-
-
-def lobes(
-    stack: MaterialLike, cos_theta: ArrayLike, phi: ArrayLike = 0.0, model: str | Model = DEFAULT, **switches: str
-) -> StackLobes | MixtureLobes:
+) -> StackLobes | Any:
     """Energy, covariance and roughness of every lobe of a material (Belcour 2018, section 5), in NumPy.
 
     Args:
@@ -89,7 +67,7 @@ def lobes(
         - `absorbed`: (C, N), what is left, which for models that lose light holds that, too.
 
         Of a mixture, lists run over the lobes of all parts, one after the other, with energies times shares; other
-        light is summed up, `transmitted` is a list, and `parts` are the lobes of each stack.
+        light is summed up, `transmitted` is a list, and `parts` are the lobes of each stack (`MixtureLobes`).
 
     Raises:
         InvalidInput: not a valid material, a cosine outside its range, lists of different lengths, an unknown model or
@@ -99,9 +77,10 @@ def lobes(
 
 
 def bsdf(stack: MaterialLike, model: str | Model = DEFAULT, **switches: Any) -> Any:
-    """A `mi.BSDF` of a material (a stack, a file, or a preset's name), in the variant that is set (else llvm_ad_rgb).
+    """A `mi.BSDF` of a material, in the variant that is set (else llvm_ad_rgb).
 
     Args:
+        stack: a material (a stack, a mixture, a file, or a preset's name).
         model: a named model, its choices changed by `switches`; or "reference", the random walk, and "weidlich_wilkie",
             the baseline, which are plugins of their own, and whose options (`microsurface=True`) stand for switches.
 
@@ -111,7 +90,7 @@ def bsdf(stack: MaterialLike, model: str | Model = DEFAULT, **switches: Any) -> 
     """
     from velatura import kernel
 
-    described = single(stack, "a BSDF")
+    described = load(stack)
     if isinstance(model, str) and model in PLUGINS:
         options = {"type": PLUGINS[model], **switches}
     elif isinstance(model, str) and model not in (known := [each.name for each in MODELS]):
@@ -135,7 +114,7 @@ def render(
     progress: Callable[[int, int], None] | None = None,
     **switches: str,
 ) -> Any:
-    """A picture of a material (a stack, a file, or a preset's name): linear RGB of shape (height, width, 3).
+    """A picture of a material (a stack, a mixture, a file, or a preset's name): linear RGB of shape (height, width, 3).
 
     Args:
         scene: "ball", "sphere", "teapot", "urn", "plane", "wedges", "lid", or a Mitsuba scene file whose BSDF
@@ -169,8 +148,8 @@ def check(
     """Check a BSDF against the laws: energy, reciprocity, sampling by its density, and the others of `checks.LAWS`.
 
     Args:
-        material: any `mi.BSDF`, ours or not; or a material (a stack, a file, or a preset's name) of which `model` makes
-            one, with the model's own exceptions, and lossless where none of its layers absorbs.
+        material: any `mi.BSDF`, ours or not; or a material (a stack, a mixture, a file, or a preset's name) of which
+            `model` makes one, with the model's own exceptions, and lossless where none of its layers absorbs.
         exceptions: names of further laws that give numbers, but no failure.
         lossless: nothing absorbs, so that loss breaks a law as well.
         expected: the BSDF or the material that this one should equal, if it is the limit of something.
@@ -188,10 +167,11 @@ def check(
 
     subject, turned = "BSDF", None
     if isinstance(material, MaterialLike):
-        material = single(material, "check")
+        material = load(material)
         subject = f"{material.name or 'material'} ({model if isinstance(model, str) else model.name})"
-        lossless = lossless or all(layer.lossless for layer in material.layers)
-        if other := material.turned(TURN):
+        lossless = lossless or all(layer.lossless for _, stack in material.leaves() for layer in stack.layers)
+        other = material.turned(TURN)
+        if other and other != material.turned(0.0):
             turned = made(other), TURN
     return checks.check(
         made(material),

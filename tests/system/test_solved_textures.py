@@ -48,9 +48,9 @@ def at_a_point(bsdf: Any, stack: vt.Stack) -> Any:
     """The uniform material of the values there."""
     si = dr.zeros(mi.SurfaceInteraction3f)
     si.uv = mi.Point2f(U, 0.5)
-    found = {name: np.array(image.at(si, True), float).ravel() for name, image in bsdf.binding.images.items()}
+    found = {name: np.array(image.at(si, True), float).ravel() for name, image in bsdf.stacks[0].binding.images.items()}
     values = {name: tuple(x.tolist()) if len(set(x)) > 1 else float(x[0]) for name, x in found.items()}
-    return vt.bsdf(stack.replace(**values), form=bsdf.model.form)
+    return vt.bsdf(stack.replace(**values), form=bsdf.stacks[0].model.form)
 
 
 def light(bsdf: Any, cosine: float) -> np.ndarray:
@@ -197,11 +197,11 @@ def test_gradients_to_texels_of_any_kind(key: str) -> None:
 
 def test_tables_stay_while_textures_stay_within_them() -> None:
     bsdf = made(COATED, layer2_alpha=texture(0.1, 0.3))
-    parameters, tables = mi.traverse(bsdf), bsdf.bodies.textured
+    parameters, tables = mi.traverse(bsdf), bsdf.stacks[0].bodies.textured
     for high, kept in ((0.35, True), (0.8, False)):
         parameters["layer2_alpha_u.data"] = mi.TensorXf(np.linspace(0.1, high, 32, dtype=np.float32).reshape(2, 16, 1))
         parameters.update()
-        assert (bsdf.bodies.textured is tables) == kept
+        assert (bsdf.stacks[0].bodies.textured is tables) == kept
 
 
 def test_two_textured_roughnesses_are_prepared_soon() -> None:

@@ -151,12 +151,12 @@ def test_every_wavelength_is_as_if_it_was_solved_by_itself(name: str) -> None:
     within .005 on average. Samples are shared so that none is heavy at any wavelength: densities within 10 %."""
     bsdf, rng, n = vt.bsdf(name), np.random.default_rng(1), 200
     nm = rng.uniform(365, 825, 12).tolist()
-    material = solve.plain(bsdf.binding.at_wavelengths([*STEERING_NM, *nm])).solid()
+    material = solve.plain(bsdf.stacks[0].binding.at_wavelengths([*STEERING_NM, *nm])).solid()
 
     def colour(*channels: Any) -> np.ndarray:
         return np.stack([np.atleast_1d(x) for x in channels]) if channels else np.zeros(len(STEERING_NM) + len(nm))
 
-    alone = bsdf.model.body(material, bsdf.variance, Context(colour=colour))
+    alone = bsdf.stacks[0].model.body(material, bsdf.stacks[0].variance, Context(colour=colour))
     z, phi = rng.uniform(0.15, 1, n), rng.uniform(0, 2 * np.pi, n)
     wi = np.sqrt(1 - z**2) * np.cos(phi), np.sqrt(1 - z**2) * np.sin(phi), z
     wo, _ = alone.sample(wi, *rng.random((3, n)))
@@ -192,7 +192,7 @@ def test_what_is_sampled_once_is_what_every_ray_would_find(name: str) -> None:
     si = seen((sine * np.cos(phi), sine * np.sin(phi), cosine), [rng.uniform(380, 750, n) for _ in range(4)], n)
     bs, _ = bsdf.sample(ctx, si, mi.Float(rng.random(n)), mi.Point2f(rng.random((2, n))))
     found = np.array(bsdf.eval(ctx, si, bs.wo))
-    bsdf.bodies = replace(bsdf.bodies, at=bsdf.bodies.lobed)
+    bsdf.stacks[0].bodies = replace(bsdf.stacks[0].bodies, at=bsdf.stacks[0].bodies.lobed)
     expected = np.array(bsdf.eval(ctx, si, bs.wo))
     off = np.abs(found - expected) > 0.01 * expected + 1e-4
     assert off.mean() < 0.01
@@ -282,9 +282,9 @@ def test_what_steers_follows_a_change() -> None:
     bsdf = vt.bsdf(vt.Stack([vt.Interface(conductor="Au", alpha=0.2)]))
     parameters = mi.traverse(bsdf)
     parameters["layer0_k.values"] = 2 * parameters["layer0_k.values"]
-    before = np.array(bsdf.binding.steering["layer0_k"])
+    before = np.array(bsdf.stacks[0].binding.steering["layer0_k"])
     parameters.update()
-    assert np.allclose(bsdf.binding.steering["layer0_k"], 2 * before)
+    assert np.allclose(bsdf.stacks[0].binding.steering["layer0_k"], 2 * before)
     gold = spectra.spectrum(spectra.Named("Au", "k"))
     assert np.allclose(before.ravel(), np.interp(STEERING_NM, *gold), rtol=1e-4)
 

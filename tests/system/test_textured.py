@@ -120,14 +120,14 @@ def test_channels_and_encodings_are_those_of_the_image(tmp_path) -> None:
     for (name, channel, encoding), texel in cases.items():
         texture = vt.Texture(texture=tmp_path / name, channel=channel, encoding=encoding, scale=0.5, offset=0.05)
         bsdf = vt.bsdf(STACK.replace(layer2_alpha_u=texture), model="belcour2018")
-        found = bsdf.binding.images["layer2_alpha_u"].at(dr.zeros(mi.SurfaceInteraction3f), True)
+        found = bsdf.stacks[0].binding.images["layer2_alpha_u"].at(dr.zeros(mi.SurfaceInteraction3f), True)
         assert np.isclose(found[0], 0.5 * texel + 0.05, atol=2e-4), (name, channel, encoding)
 
 
 def test_values_are_kept_within_their_range(tmp_path) -> None:
     texture = vt.Texture(texture=image(tmp_path, np.full((2, 2, 1), 0.5)), scale=100, offset=-200)
     bsdf = vt.bsdf(STACK.replace(layer0_alpha_u=texture, layer0_eta=texture, layer1_g=texture, layer1_depth=texture))
-    interface, medium, *_ = bsdf.binding.at(dr.zeros(mi.SurfaceInteraction3f), True).layers
+    interface, medium, *_ = bsdf.stacks[0].binding.at(dr.zeros(mi.SurfaceInteraction3f), True).layers
     assert interface.alpha_u[0] == 0 and medium.depth[0] == 0
     assert interface.eta[0][0] > 0 and medium.g[0] > -1
     assert np.isfinite(value(bsdf, 0.5)).all()

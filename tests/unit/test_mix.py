@@ -102,7 +102,7 @@ def test_a_texture_weighs_a_part(tmp_path: Path) -> None:
         "mix:\n- weight: {texture: mask.png}\n  material: bare-gold\n- material: coated-gold\n", encoding="utf-8"
     )
     mix = vt.load(tmp_path / "worn.yaml")
-    assert mix.mix[0].weight == vt.Texture(texture=picture, channel="r")
+    assert isinstance(mix, vt.Mix) and mix.mix[0].weight == vt.Texture(texture=picture, channel="r")
     with pytest.raises(vt.InvalidInput, match=r"^part0_weight: is a texture, and lobes are of one point$"):
         mix.weighted("lobes are of one point")
     (tmp_path / "copies").mkdir()

@@ -1,58 +1,45 @@
-"""The material of a plugin: with values at a point, with uniform ones, or with ranges."""
+"""A stack of a plugin: with values at a point, with uniform ones, or with ranges."""
 
 from __future__ import annotations
 
-import warnings
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
-import numpy as np
-
 from velatura import kernel
-from velatura.binding import properties as properties_of
 from velatura.binding.textures import Range
-from velatura.errors import InvalidInput
+from velatura.binding.values import Values
 from velatura.films.textured import UNKNOWN, Span, constant_films
-from velatura.stack import Address, Material, MeasuredIndex
+from velatura.stack import Address, Material, MeasuredIndex, Stack
 
 #: Wavelengths (nm) that stand for all light where all colours share one number, as one refracted direction: each for a
 #: quarter of the mean of the three curves that make sRGB of a spectrum under D65.
 STEERING_NM = (445.0, 525.0, 585.0, 620.0)
 
 
-class Binding:
-    """The values of one plugin.
+class Binding(Values):
+    """The values of one stack.
 
     Args:
         mi: Mitsuba, with a variant set.
-        properties: of the plugin; all names are read but those in `options`.
+        stack: as described; textures given as objects have a number standing in.
+        values: those of the stack, and objects of Mitsuba in their place.
+        prefix: of the names in messages.
 
     Attributes:
-        stack: the material as described; textures given as objects have a number standing in.
-        addresses: of all values by flat name.
         derived: names of values that follow from others: the asymmetry of a phase function that is written.
-        parameters: Dr.Jit values by flat name, as they were given or last changed.
-        constants: the same, within the ranges of their parameters.
-        images: textures, spectra and fields by flat name.
-        ranges: what these give, by flat name; None where that is known on a shape only.
         metals: of every layer, the index over wavelength that its eta and k are colours of; None where they are not.
         steering: colours of those that are the same everywhere, at `STEERING_NM`; in spectral variants.
 
     Raises:
-        InvalidInput: in one line, for anything that a material file would be refused for, and for unknown names.
+        InvalidInput: in one line, for anything that a material file would be refused for.
     """
 
-    def __init__(self, mi: Any, properties: Any, options: Collection[str] = ()) -> None:
-        self.mi = mi
-        self.stack, values = properties_of.described(mi, properties, options)
-        self.addresses = {address.name: address for address in values}
-        phases = self.stack.phases
+    def __init__(self, mi: Any, stack: Stack, values: Mapping[Address, Any], prefix: str = "") -> None:
+        super().__init__(mi, values, prefix)
+        self.stack = stack
+        phases = stack.phases
         self.derived = {at.name for at in values if at.key == "g" and at.layer is not None and phases[at.layer]}
-        self.parameters, self.images = properties_of.bound(mi, values)
-        self.constants: dict[str, Any] = {}
-        self.ranges: dict[str, Range | None] = {}
         self.steering: dict[str, Any] = {}
-        self.clamped: set[str] = set()
         self.coatings: Sequence[Any] = ()
         self.metals: Sequence[MeasuredIndex | None] = ()
         self._measured = self._of_measured_metals()
@@ -62,11 +49,6 @@ class Binding:
     def uniform(self) -> bool:
         """Whether no value changes from point to point, or with the wavelengths of a ray."""
         return not self.images and not self.interferes
-
-    @property
-    def varies(self) -> bool:
-        """Whether any value changes from point to point."""
-        return any(image.varies for image in self.images.values())
 
     @property
     def interferes(self) -> bool:
@@ -92,52 +74,13 @@ class Binding:
         """
         import drjit as dr
 
-        ranges: dict[int, Range | None] = {}  # one for values that share an image
-        for name, image in self.images.items():
-            if id(image) not in ranges:
-                ranges[id(image)] = image.range(self.mi, name)
-            self.ranges[name] = ranges[id(image)]
-        within = {name: self._within_range(name, value) for name, value in self.parameters.items()}
-        self.constants = {name: self._shared(value) for name, value in within.items()}
-        dr.make_opaque(self.constants)  # a changed value needs no new kernel
+        super().update()
         self.coatings, self.metals = self._coatings(), self._metals()
         if self.mi.is_spectral:
             si = self._interaction_at_fixed_wavelengths(dr.zeros(self.mi.SurfaceInteraction3f))
             flat = [name for name, image in self.images.items() if image.colour and not image.varies]
             self.steering = {name: self.images[name].at(si, True) for name in flat}
             dr.make_opaque(self.steering)
-
-    def _within_range(self, name: str, value: Any) -> Any:
-        """The value itself, or the nearest one that is allowed, with one warning.
-
-        Gradients pass all the same, or an optimiser that has overshot would not come back.
-
-        Raises:
-            InvalidInput: it is not finite, so that none is near.
-        """
-        import drjit as dr
-
-        declared, channels = self.addresses[name].declared, kernel.numbers(value)
-        try:
-            for channel in channels:
-                declared.check(channel)
-        except ValueError as error:
-            if not np.isfinite(channels).all():
-                raise InvalidInput(f"{name}: {error}") from None
-            if name not in self.clamped:
-                self.clamped.add(name)
-                warnings.warn(f"{name}: {error}; the nearest value that is allowed stands for it", stacklevel=2)
-            return dr.replace_grad(dr.clip(value, *declared.within), value)
-        return value
-
-    def _shared(self, value: Any) -> Any:
-        """A colour as one number where that holds all of it, so that a grey material costs what a number does."""
-        import drjit as dr
-
-        if not isinstance(value, self.mi.Color3f):
-            return value
-        own = [channel.index_ad for channel in value] if dr.grad_enabled(value) else kernel.numbers(value)
-        return value.x if len(set(own)) == 1 else value
 
     def _coatings(self) -> Sequence[Any]:
         """The films on each layer, worked out."""
@@ -190,10 +133,6 @@ class Binding:
         """The material with these values by flat name; at the fixed wavelengths in spectral variants, unless given."""
         light = self._light if wavelengths_nm is None else wavelengths_nm
         return Material.from_flat(self.stack, values, light).coated(self.coatings).of_metals(self.metals)
-
-    def value(self, name: str, si: Any, active: Any) -> Any:
-        """The value of a flat name at a surface point."""
-        return self.images[name].at(si, active) if name in self.images else self.constants[name]
 
     def at(self, si: Any, active: Any) -> Material:
         """The material at a surface point."""

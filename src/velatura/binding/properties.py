@@ -1,4 +1,4 @@
-"""The properties of a plugin: the stack that they describe, and its values as Mitsuba has them."""
+"""The properties of a plugin: the material that they describe, and its values as Mitsuba has them."""
 
 from __future__ import annotations
 
@@ -11,16 +11,17 @@ import numpy as np
 from velatura.binding import textures
 from velatura.binding.textures import BrushedField, Image
 from velatura.errors import InvalidInput
-from velatura.stack import Address, Brushing, Measured, Stack, Texture, addressed, load, loads, single
-from velatura.stack.io import foreign
+from velatura.stack import Address, Brushing, Described, Measured, Texture, addressed, load, loads
+from velatura.stack.io import Loaded, foreign
+from velatura.stack.mix import from_flat
 
-#: The value in the stack in place of a texture object of a plugin, if its parameter declares no typical one.
+#: The value in the material in place of a texture object of a plugin, if its parameter declares no typical one.
 _STAND_IN = 0.5
 
 
-def described(mi: Any, properties: Any, options: Collection[str]) -> tuple[Stack, dict[Address, Any]]:
-    """The stack that properties describe, all but `options`; and its values, with objects of Mitsuba among them, for
-    which numbers stand in the stack.
+def described(mi: Any, properties: Any, options: Collection[str]) -> tuple[Described, dict[Address, Any]]:
+    """The material that properties describe, all but `options`; and its values, with objects of Mitsuba among them, for
+    which numbers stand in the material.
 
     Raises:
         InvalidInput: anything that a material file would be refused for, and unknown names.
@@ -34,21 +35,27 @@ def described(mi: Any, properties: Any, options: Collection[str]) -> tuple[Stack
             if not all(address.declared.texturable for address in found):
                 raise InvalidInput(f"{name}: must be a number, which is the same everywhere and for all wavelengths")
             objects.update({address.name: value for address in found})
-            stand_ins.update({address.name: address.declared.typical or _STAND_IN for address in found})
+            stand_ins.update({address.name: _stand_in(address) for address in found})
             if not found:
                 stand_ins[name] = _STAND_IN  # to be refused as any unknown name
     numbers = {k: v for k, v in given.items() if not isinstance(v, mi.Object) and k != "material"} | stand_ins
     named = "material" in given
-    stack = (
-        single(_named(mi, str(given["material"])), "a BSDF").replace(**numbers)
-        if named
-        else Stack.from_flat(None, numbers)
-    )
-    return stack, {address: objects.get(address.name, value) for address, value in stack.values()}
+    material = _named(mi, str(given["material"])).replace(**numbers) if named else from_flat(numbers)
+    return material, {address: objects.get(address.name, value) for address, value in material.values()}
 
 
-def bound(mi: Any, values: Mapping[Address, Any]) -> tuple[dict[str, Any], dict[str, Image | BrushedField]]:
-    """Values as those of Mitsuba, by flat name: numbers and colours; textures, spectra and fields."""
+def _stand_in(address: Address) -> float:
+    typical = address.declared.typical
+    return _STAND_IN if typical is None else typical
+
+
+def bound(
+    mi: Any, values: Mapping[Address, Any], prefix: str = ""
+) -> tuple[dict[str, Any], dict[str, Image | BrushedField]]:
+    """Values as those of Mitsuba, by flat name: numbers and colours; textures, spectra and fields.
+
+    In messages names begin with the prefix.
+    """
     numbers: dict[str, Any] = {}
     images: dict[str, Image | BrushedField] = {}
     for address, value in values.items():
@@ -57,9 +64,9 @@ def bound(mi: Any, values: Mapping[Address, Any]) -> tuple[dict[str, Any], dict[
         if first != address and first.name in images and value == values[first]:
             images[name] = images[first.name]  # so that the interface stays isotropic
         elif isinstance(value, mi.Object):
-            images[name] = textures.of_object(mi, address, value)
+            images[name] = textures.of_object(mi, address, value, prefix + name)
         elif isinstance(value, Texture):
-            images[name] = textures.of_file(mi, address, value)
+            images[name] = textures.of_file(mi, address, value, prefix + name)
         elif isinstance(value, Brushing):
             images[name] = BrushedField(value)
         elif address.colour and mi.is_spectral and not isinstance(value, float):
@@ -95,8 +102,8 @@ def _given(mi: Any, properties: Any, name: str) -> Any:
     return channels[0] if len(set(channels)) == 1 else tuple(channels)
 
 
-def _named(mi: Any, material: str) -> Stack:
-    """The stack named in a scene; files are resolved like those of Mitsuba's own plugins, beside the scene."""
+def _named(mi: Any, material: str) -> Loaded:
+    """The material named in a scene; files are resolved like those of Mitsuba's own plugins, beside the scene."""
 
     def find(path: str) -> str:
         return str(mi.file_resolver().resolve(path))

@@ -132,18 +132,18 @@ class BrushedField:
         return f"{self.brushing.brushing} about ({self.brushing.u:g}, {self.brushing.v:g}){turned}"
 
 
-def of_object(mi: Any, address: Address, texture: Any) -> Image:
-    """A texture that a scene gives to a plugin in place of a value."""
+def of_object(mi: Any, address: Address, texture: Any, name: str) -> Image:
+    """A texture that a scene gives to a plugin in place of a value, of that flat name."""
     kind = texture.class_name()
     if kind in SPECTRA or kind.startswith("BitmapTexture") or not isinstance(texture, mi.Texture):
-        evaluated(mi, address.name, texture, address.colour)
+        evaluated(mi, name, texture, address.colour)
     return Image.of(address, texture, address.colour)
 
 
-def of_file(mi: Any, address: Address, image: Texture) -> Image:
-    """A texture of a material file."""
+def of_file(mi: Any, address: Address, image: Texture, name: str) -> Image:
+    """A texture of a material file, in place of the value of that flat name."""
     colour = address.colour and image.channel in (None, "rgb")
-    decoded, scale = texels(mi, address.name, image, colour), image.scale
+    decoded, scale = texels(mi, name, image, colour), image.scale
     upsampled = mi.is_spectral and decoded.shape[-1] == 3
     if upsampled:
         peak = max(float(decoded.max()), 1.0)

@@ -8,11 +8,13 @@ with both directions refracted about their half-vector, and f_2 layered in turn.
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from functools import partial
 from math import pi
 from typing import Any
 
 from velatura import kernel, ops
-from velatura.binding import Binding, plugin_class
+from velatura.binding import Asked, Binding, plugin_class
 from velatura.ops import Value
 from velatura.optics import fresnel, ggx, refraction
 from velatura.optics.ggx import Direction
@@ -27,9 +29,6 @@ EXCEPTIONS = frozenset({"lossless"})  # laws of `velatura.checks`: light that is
 @kernel.plugin("weidlich_wilkie")
 def make(mi: Any) -> type:
     """The class for the current variant."""
-    import drjit as dr
-
-    flags = mi.BSDFFlags
 
     class WeidlichWilkie(plugin_class(mi)):  # type: ignore[misc]
         """Layered material after Weidlich and Wilkie 2007, the baseline of the statistical models.
@@ -40,54 +39,80 @@ def make(mi: Any) -> type:
             exterior (number, default 1): absolute index above.
 
         Light reflects once, at one of the interfaces; media absorb and do not scatter; nothing is transmitted.
-        Interfaces of roughness below 0.001 are evaluated as of that. Each surface is a component, from the top.
+        Interfaces of roughness below 0.001 are evaluated as of that. Each surface is a component, from the top, and
+        those of a mixture follow each other, as in `layered`.
         """
 
-        exceptions = EXCEPTIONS
-
         def __init__(self, properties: Any) -> None:
-            mi.BSDF.__init__(self, properties)
-            self.binding = Binding(mi, properties)
-            stack = self.binding.stack
-            refuse_films(stack, "weidlich_wilkie has")
-            self.surfaces = stack.surfaces
-            common = flags.FrontSide | (flags.SpatiallyVarying if self.binding.varies else flags.Empty)
-            self.types = [flags.GlossyReflection] * len(self.surfaces)
-            if stack.base:
-                self.types[-1] = flags.DiffuseReflection
-            glossy = flags.GlossyReflection | flags.Anisotropic
-            each = [glossy if kind == flags.GlossyReflection else kind for kind in self.types]
-            self.has_components([common | kind for kind in each])
-            self.facts = {"kinds": ", ".join(stack.kinds)}
-
-        def parameters_changed(self, keys: list[str]) -> None:
-            self.binding.update()
-
-        def sample(self, ctx: Any, si: Any, sample1: Any, sample2: Any, active: Any = True) -> Any:
-            bs, material = mi.BSDFSample3f(), self.binding.at(si, active)
-            wo, number = sample(material, tuple(si.wi), sample1, sample2.x, sample2.y, self._asked(ctx))
-            bs.wo, bs.eta, bs.sampled_component = mi.Vector3f(*wo), 1.0, mi.UInt32(number)
-            last = bs.sampled_component == len(self.surfaces) - 1
-            bs.sampled_type = dr.select(last, mi.UInt32(+self.types[-1]), mi.UInt32(+self.types[0]))
-            value, bs.pdf = self.eval_pdf(ctx, si, bs.wo, active)
-            return bs, value / dr.maximum(bs.pdf, 1e-30) & (bs.pdf > 0)
-
-        def eval_pdf(self, ctx: Any, si: Any, wo: Any, active: Any = True) -> tuple[Any, Any]:
-            material, asked = self.binding.at(si, active), self._asked(ctx)
-            active = active & (si.wi.z > 0) & (wo.z > 0)
-            value = evaluate(material, tuple(si.wi), tuple(wo), asked)
-            pdf = density(material, tuple(si.wi), tuple(wo), asked)
-            return mi.depolarizer(mi.UnpolarizedSpectrum(value)) & active, dr.select(active, pdf, 0)
-
-        def eval_diffuse_reflectance(self, si: Any, active: Any = True) -> Any:
-            albedo = mi.UnpolarizedSpectrum(sum(_energies(self.binding.at(si, active), si.wi.z).values()))
-            return dr.clip(albedo, 0, 1) & active & (si.wi.z > 0)
-
-        def _asked(self, ctx: Any) -> list[int]:
-            """The queried surfaces."""
-            return [k for number, k in enumerate(self.surfaces) if ctx.is_enabled(self.types[number], number)]
+            super().__init__(properties, partial(WeidlichWilkieStack, mi))
 
     return WeidlichWilkie
+
+
+class WeidlichWilkieStack:
+    """One stack."""
+
+    exceptions = EXCEPTIONS
+
+    def __init__(self, mi: Any, binding: Binding) -> None:
+        self.mi, self.binding, flags = mi, binding, mi.BSDFFlags
+        stack = binding.stack
+        refuse_films(stack, "weidlich_wilkie has")
+        self.surfaces = stack.surfaces
+        common = flags.FrontSide | (flags.SpatiallyVarying if binding.varies else flags.Empty)
+        self.kinds = [flags.GlossyReflection] * len(self.surfaces)
+        if stack.base:
+            self.kinds[-1] = flags.DiffuseReflection
+        glossy = flags.GlossyReflection | flags.Anisotropic
+        self.components = [common | (glossy if kind == flags.GlossyReflection else kind) for kind in self.kinds]
+
+    def update(self) -> None:
+        pass
+
+    def at(self, si: Any, asked: Asked, active: Any) -> WeidlichWilkiePoint:
+        wanted = [surface for surface, is_asked in zip(self.surfaces, asked.components) if is_asked]
+        return WeidlichWilkiePoint(self, self.binding.at(si, active), tuple(si.wi), wanted)
+
+    def albedo(self, si: Any, active: Any) -> Any:
+        import drjit as dr
+
+        albedo = self.mi.UnpolarizedSpectrum(sum(_energies(self.binding.at(si, active), si.wi.z).values()))
+        return dr.clip(albedo, 0, 1) & active & (si.wi.z > 0)
+
+
+@dataclass(frozen=True)
+class WeidlichWilkiePoint:
+    """A stack at a surface point, for light from one direction, by the `asked` surfaces."""
+
+    stack: WeidlichWilkieStack
+    material: Material
+    wi: Direction
+    asked: list[int]
+
+    def draw(self, sample1: Any, sample2: Any, active: Any) -> tuple[Any, None]:
+        import drjit as dr
+
+        mi, kinds = self.stack.mi, self.stack.kinds
+        bs = dr.zeros(mi.BSDFSample3f)
+        wo, number = sample(self.material, self.wi, sample1, sample2.x, sample2.y, self.asked)
+        bs.wo, bs.eta, bs.sampled_component = mi.Vector3f(*wo), 1.0, mi.UInt32(number)
+        last = bs.sampled_component == len(kinds) - 1
+        bs.sampled_type = dr.select(last, mi.UInt32(+kinds[-1]), mi.UInt32(+kinds[0]))
+        return bs, None
+
+    def eval(self, wo: Any, active: Any) -> Any:
+        return self.eval_pdf(wo, active)[0]
+
+    def pdf(self, wo: Any, active: Any) -> Any:
+        return self.eval_pdf(wo, active)[1]
+
+    def eval_pdf(self, wo: Any, active: Any) -> tuple[Any, Any]:
+        import drjit as dr
+
+        mi, active = self.stack.mi, active & (self.wi[2] > 0) & (wo.z > 0)
+        value = evaluate(self.material, self.wi, tuple(wo), self.asked)
+        pdf = density(self.material, self.wi, tuple(wo), self.asked)
+        return mi.depolarizer(mi.UnpolarizedSpectrum(value)) & active, dr.select(active, pdf, 0)
 
 
 def evaluate(material: Material, wi: Direction, wo: Direction, asked: Sequence[int] | None = None) -> Value:

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import struct
+from dataclasses import dataclass
+from functools import partial
 from typing import Any
 
 import numpy as np
 
 from velatura import kernel, metals
-from velatura.binding import Binding, plugin_class
+from velatura.binding import Asked, Binding, plugin_class
 from velatura.errors import InvalidInput
 from velatura.reference import proxy
 from velatura.reference.layers import ALPHA_MIN, WalkedLayers, from_material, relative_index, zeros
@@ -31,9 +33,6 @@ OUTSIDE, GAIN = frozenset({"finite"}), frozenset({"energy"})
 @kernel.plugin("layered_reference")
 def make(mi: Any) -> type:
     """The class for the current variant."""
-    import drjit as dr
-
-    flags = mi.BSDFFlags
 
     class LayeredReference(plugin_class(mi)):  # type: ignore[misc]
         """Layered material by position-free random walks (Guo et al. 2018).
@@ -55,167 +54,215 @@ def make(mi: Any) -> type:
         by name or by tables may have a negative channel, since light that has met it often lies outside sRGB.
 
         Components are light that met only smooth interfaces (delta), light that the diffuse base scattered (diffuse),
-        and all other light (glossy), by side.
+        and all other light (glossy), by side. Those of a mixture follow each other; a path walks in one of its stacks.
         """
 
         def __init__(self, properties: Any) -> None:
-            mi.BSDF.__init__(self, properties)
             options = {"seed": 0, "microsurface": False, "max_depth": _MAX_DEPTH}
             chosen = {name: properties[name] if name in properties else options[name] for name in options}
-            self.seed = _integer("seed", chosen["seed"], 0, 2**32 - 1)
-            self.max_depth = _integer("max_depth", chosen["max_depth"], 1, 10**6)
-            self.microsurface = _switch("microsurface", chosen["microsurface"])
-            self.binding = Binding(mi, properties, set(options))
-            self._update()
-
-        # The material, and what follows from it
-
-        def parameters_changed(self, keys: list[str]) -> None:
-            self.binding.update()
-            self._update()
-
-        def _update(self) -> None:
-            """Determine the parts that the walk may leave out, and the kinds of scattering."""
-            binding = self.binding
-            peaks = {name: float(np.max(np.abs(np.array(value)))) for name, value in binding.constants.items()}
-            seen = binding.material({**peaks, **binding.images})
-            self.zeros = zeros(seen)
-            metal = metals.of(seen, WAVELENGTHS)
-            self.exceptions = EXCEPTIONS if self.microsurface else EXCEPTIONS | LOSS
-            if metal:
-                self.exceptions |= OUTSIDE | GAIN if metal.exceeds else OUTSIDE
-            # An interface whose roughness varies may be smooth here and rough there
-            widest = [_widest(seen.layers[k]) for k in seen.surfaces]
-            scatters = any(layer.spreads for k, layer in enumerate(seen.layers) if k not in seen.surfaces)
-            rough = [alpha is None or alpha >= ALPHA_MIN for alpha in widest]
-            smooth = [alpha is None or alpha < ALPHA_MIN for alpha in widest]
-            self.transmits, self.painted = binding.stack.transmits, binding.stack.base is not None
-            self.glossy = scatters or any(rough)
-            # Declare them
-            sides = flags.FrontSide | (flags.BackSide if self.transmits else flags.Empty)
-            varying = flags.Empty if binding.uniform else flags.SpatiallyVarying
-            common = sides | varying | flags.Anisotropic
-            there = {
-                flags.GlossyReflection: scatters or any(rough[:-1] if self.painted else rough),
-                flags.DeltaReflection: smooth[0] or (self.transmits and smooth[-1]),
-                flags.DiffuseReflection: self.painted,
-                flags.GlossyTransmission: self.transmits and self.glossy,
-                flags.DeltaTransmission: self.transmits and all(smooth),
-            }
-            self.kinds = [kind for kind, is_there in there.items() if is_there]
-            passing = (flags.GlossyTransmission, flags.DeltaTransmission)
-            one_way = [flags.NonSymmetric if kind in passing else flags.Empty for kind in self.kinds]
-            self.has_components([kind | common | extra for kind, extra in zip(self.kinds, one_way)])
-            options = {"microsurface": str(self.microsurface).lower(), "max_depth": str(self.max_depth)}
-            self.facts = {**options, "seed": str(self.seed), "kinds": ", ".join(binding.stack.kinds)}
-
-        def _layers(self, si: Any, active: Any, flipped: Any) -> WalkedLayers:
-            """The layers at a point, seen from below where `flipped`."""
-            material = self.binding.at(si, active)
-            material = material.each(lambda address, value: 0.0 if address in self.zeros else value)
-            layers = from_material(mi, material, self.microsurface)
-            return layers.reversed(flipped) if self.transmits else layers
-
-        def _stream(self, *numbers: Any) -> Any:
-            """Random numbers that follow from the seed and from the query."""
-            a, b = mi.UInt32(self.seed), mi.UInt32(0)
-            bits = [_bits(mi, x) for x in numbers]
-            for x, y in zip(bits[::2], bits[1::2]):
-                a, b = mi.sample_tea_32(a ^ x, b ^ y, 4)
-            return mi.PCG32(initstate=mi.UInt64(a), initseq=mi.UInt64(b))
-
-        # The interface of a BSDF
-
-        def sample(self, ctx: Any, si: Any, sample1: Any, sample2: Any, active: Any = True) -> Any:
-            # Walk, from above
-            wi, flipped = si.wi, si.wi.z < 0
-            active = active & (True if self.transmits else wi.z > 0)
-            layers = self._layers(si, active, flipped)
-            rng = self._stream(sample1, sample2.x, sample2.y, wi.x, wi.y, si.p.x, si.p.y, si.p.z)
-            seen = (wi.x, wi.y, dr.abs(wi.z))
-            one = layers.start(mi.UnpolarizedSpectrum(1))
-            path = walk(mi, layers, seen, rng, one, active, self.max_depth)
-            weight = layers.seen(path.weight, mi.UnpolarizedSpectrum)
-            # Describe how it ended
-            reflected = path.w[2] > 0
-            bs = mi.BSDFSample3f()
-            bs.wo = mi.Vector3f(path.w[0], path.w[1], dr.select(flipped, -path.w[2], path.w[2]))
-            bs.eta = dr.select(reflected, 1.0, mi.Float(relative_index(layers.index[0], layers.index[-1])))
-            bs.pdf = dr.select(path.smooth, 1.0, proxy.density(layers, seen, path.w))
-            bs.sampled_component, bs.sampled_type, asked = self._drawn(ctx, reflected, path)
-            passed = active & (path.alive ^ True) & asked
-            if ctx.mode == mi.TransportMode.Radiance:
-                weight /= bs.eta * bs.eta
-            return bs, mi.depolarizer(dr.select(passed, weight, 0))
-
-        def eval(self, ctx: Any, si: Any, wo: Any, active: Any = True) -> Any:
-            # Walk towards the upper side, by which light leaves
-            wi, flipped = si.wi, wo.z < 0
-            active = active & self._asked(ctx, wi.z * wo.z > 0)
-            active = active & (True if self.transmits else (wi.z > 0) & (wo.z > 0)) & self.glossy
-            layers = self._layers(si, active, flipped)
-            rng = self._stream(wi.x, wi.y, wo.x, wo.y, si.p.x, si.p.y, si.p.z, si.uv.x, si.uv.y, wo.z)
-            out, rng = way_out(mi, layers, (wo.x, wo.y, dr.abs(wo.z)), rng)
-            seen = (wi.x, wi.y, dr.select(flipped, -wi.z, wi.z))
-            one = layers.start(mi.UnpolarizedSpectrum(1))
-            path = walk(mi, layers, seen, rng, one, active, self.max_depth, out, self._painted(ctx))
-            value = layers.seen(path.value, mi.UnpolarizedSpectrum)
-            # Turn energy into radiance
-            if self.transmits and ctx.mode == mi.TransportMode.Radiance:
-                scale = dr.select(seen[2] > 0, 1.0, relative_index(layers.index[0], layers.index[-1]))
-                value *= scale * scale
-            return mi.depolarizer(dr.select(active, value, 0))
-
-        def pdf(self, ctx: Any, si: Any, wo: Any, active: Any = True) -> Any:
-            flipped = si.wi.z < 0
-            active = active & self._asked(ctx, si.wi.z * wo.z > 0) & self.glossy
-            active = active & (True if self.transmits else (si.wi.z > 0) & (wo.z > 0))
-            layers = self._layers(si, active, flipped)
-            turned = (wo.x, wo.y, dr.select(flipped, -wo.z, wo.z))
-            return dr.select(active, proxy.density(layers, (si.wi.x, si.wi.y, dr.abs(si.wi.z)), turned), 0)
-
-        def eval_pdf(self, ctx: Any, si: Any, wo: Any, active: Any = True) -> tuple[Any, Any]:
-            return self.eval(ctx, si, wo, active), self.pdf(ctx, si, wo, active)
-
-        def eval_diffuse_reflectance(self, si: Any, active: Any = True) -> Any:
-            """Albedo by one path, and so an estimate."""
-            asked = mi.BSDFContext(mi.TransportMode.Importance)
-            random = self._stream(si.p.x, si.p.y, si.p.z, si.wi.x, si.wi.y, si.wi.z)
-            u = mi.Point3f(random.next_float32(), random.next_float32(), random.next_float32())
-            _, weight = self.sample(asked, si, u.x, mi.Point2f(u.y, u.z), active)
-            return dr.clip(mi.unpolarized_spectrum(weight), 0, 1)
-
-        def _wanted(self, ctx: Any, kind: Any) -> bool:
-            return kind in self.kinds and ctx.is_enabled(kind, self.kinds.index(kind))
-
-        def _asked(self, ctx: Any, reflected: Any) -> Any:
-            """Whether any scattered light of that side is queried."""
-            reflection = self._wanted(ctx, flags.GlossyReflection) or self._wanted(ctx, flags.DiffuseReflection)
-            transmission = self._wanted(ctx, flags.GlossyTransmission)
-            return (reflected & reflection) | ((reflected ^ True) & transmission)
-
-        def _painted(self, ctx: Any) -> bool | None:
-            """Whether scattered light is asked for of the base alone, or of all else; None for both."""
-            diffuse = self._wanted(ctx, flags.DiffuseReflection)
-            return None if diffuse == self._wanted(ctx, flags.GlossyReflection) or not self.painted else diffuse
-
-        def _drawn(self, ctx: Any, reflected: Any, path: Path) -> tuple[Any, Any, Any]:
-            """Number and type of the component that a path belongs to, and whether it was asked for."""
-            passed = reflected ^ True
-            belongs = {
-                flags.GlossyReflection: reflected & ((path.smooth | path.painted) ^ True),
-                flags.DeltaReflection: reflected & path.smooth,
-                flags.DiffuseReflection: reflected & path.painted,
-                flags.GlossyTransmission: passed & (path.smooth ^ True),
-                flags.DeltaTransmission: passed & path.smooth,
-            }
-            number, kind, asked = mi.UInt32(0), mi.UInt32(+self.kinds[0]), mi.Bool(False)
-            for k, each in enumerate(self.kinds):
-                number, kind = dr.select(belongs[each], k, number), dr.select(belongs[each], +each, kind)
-                asked |= belongs[each] & ctx.is_enabled(each, k)
-            return number, kind, asked
+            settings = Settings(
+                seed=_integer("seed", chosen["seed"], 0, 2**32 - 1),
+                max_depth=_integer("max_depth", chosen["max_depth"], 1, 10**6),
+                microsurface=_switch("microsurface", chosen["microsurface"]),
+            )
+            super().__init__(properties, partial(WalkedStack, mi, settings), set(options), settings.facts)
 
     return LayeredReference
+
+
+@dataclass(frozen=True)
+class Settings:
+    """How paths walk: properties of the plugin."""
+
+    seed: int
+    max_depth: int
+    microsurface: bool
+
+    @property
+    def facts(self) -> dict[str, str]:
+        microsurface = str(self.microsurface).lower()
+        return {"microsurface": microsurface, "max_depth": str(self.max_depth), "seed": str(self.seed)}
+
+
+class WalkedStack:
+    """One stack, by walks through it."""
+
+    def __init__(self, mi: Any, settings: Settings, binding: Binding) -> None:
+        self.mi, self.settings, self.binding = mi, settings, binding
+        self.update()
+
+    # The material, and what follows from it
+
+    def update(self) -> None:
+        """Determine the parts that the walk may leave out, and the kinds of scattering."""
+        binding, flags = self.binding, self.mi.BSDFFlags
+        peaks = {name: float(np.max(np.abs(np.array(value)))) for name, value in binding.constants.items()}
+        seen = binding.material({**peaks, **binding.images})
+        self.zeros = zeros(seen)
+        metal = metals.of(seen, WAVELENGTHS)
+        self.exceptions = EXCEPTIONS if self.settings.microsurface else EXCEPTIONS | LOSS
+        if metal:
+            self.exceptions |= OUTSIDE | GAIN if metal.exceeds else OUTSIDE
+        # An interface whose roughness varies may be smooth here and rough there
+        widest = [_widest(seen.layers[k]) for k in seen.surfaces]
+        scatters = any(layer.spreads for k, layer in enumerate(seen.layers) if k not in seen.surfaces)
+        rough = [alpha is None or alpha >= ALPHA_MIN for alpha in widest]
+        smooth = [alpha is None or alpha < ALPHA_MIN for alpha in widest]
+        self.transmits, self.painted = binding.stack.transmits, binding.stack.base is not None
+        self.glossy = scatters or any(rough)
+        # Declare them
+        sides = flags.FrontSide | (flags.BackSide if self.transmits else flags.Empty)
+        varying = flags.Empty if binding.uniform else flags.SpatiallyVarying
+        common = sides | varying | flags.Anisotropic
+        there = {
+            flags.GlossyReflection: scatters or any(rough[:-1] if self.painted else rough),
+            flags.DeltaReflection: smooth[0] or (self.transmits and smooth[-1]),
+            flags.DiffuseReflection: self.painted,
+            flags.GlossyTransmission: self.transmits and self.glossy,
+            flags.DeltaTransmission: self.transmits and all(smooth),
+        }
+        self.kinds = [kind for kind, is_there in there.items() if is_there]
+        passing = (flags.GlossyTransmission, flags.DeltaTransmission)
+        one_way = [flags.NonSymmetric if kind in passing else flags.Empty for kind in self.kinds]
+        self.components = [kind | common | extra for kind, extra in zip(self.kinds, one_way)]
+
+    def layers(self, si: Any, active: Any, flipped: Any) -> WalkedLayers:
+        """The layers at a point, seen from below where `flipped`."""
+        material = self.binding.at(si, active)
+        material = material.each(lambda address, value: 0.0 if address in self.zeros else value)
+        layers = from_material(self.mi, material, self.settings.microsurface)
+        return layers.reversed(flipped) if self.transmits else layers
+
+    def stream(self, *numbers: Any) -> Any:
+        """Random numbers that follow from the seed and from the query."""
+        mi = self.mi
+        a, b = mi.UInt32(self.settings.seed), mi.UInt32(0)
+        bits = [_bits(mi, x) for x in numbers]
+        for x, y in zip(bits[::2], bits[1::2]):
+            a, b = mi.sample_tea_32(a ^ x, b ^ y, 4)
+        return mi.PCG32(initstate=mi.UInt64(a), initseq=mi.UInt64(b))
+
+    # As light meets it
+
+    def at(self, si: Any, asked: Asked, active: Any) -> WalkedPoint:
+        return WalkedPoint(self, si, dict(zip(self.kinds, asked.components)), asked.radiance)
+
+    def albedo(self, si: Any, active: Any) -> Any:
+        """Albedo by one path, and so an estimate."""
+        import drjit as dr
+
+        mi = self.mi
+        random = self.stream(si.p.x, si.p.y, si.p.z, si.wi.x, si.wi.y, si.wi.z)
+        u = mi.Point3f(random.next_float32(), random.next_float32(), random.next_float32())
+        point = self.at(si, Asked([True] * len(self.kinds), False), active)
+        _, weight = point.draw(u.x, mi.Point2f(u.y, u.z), active)
+        return dr.clip(mi.unpolarized_spectrum(weight), 0, 1)
+
+
+@dataclass(frozen=True)
+class WalkedPoint:
+    """A stack at a surface point, for light from one direction; `asked` is whether light of a kind is asked for."""
+
+    stack: WalkedStack
+    si: Any
+    asked: dict[Any, bool]
+    radiance: bool
+
+    def draw(self, sample1: Any, sample2: Any, active: Any) -> tuple[Any, Any]:
+        import drjit as dr
+
+        # Walk, from above
+        stack, mi, si, wi = self.stack, self.stack.mi, self.si, self.si.wi
+        flipped = wi.z < 0
+        active = active & (True if stack.transmits else wi.z > 0)
+        layers = stack.layers(si, active, flipped)
+        rng = stack.stream(sample1, sample2.x, sample2.y, wi.x, wi.y, si.p.x, si.p.y, si.p.z)
+        seen = (wi.x, wi.y, dr.abs(wi.z))
+        one = layers.start(mi.UnpolarizedSpectrum(1))
+        path = walk(mi, layers, seen, rng, one, active, stack.settings.max_depth)
+        weight = layers.seen(path.weight, mi.UnpolarizedSpectrum)
+        # Describe how it ended
+        reflected = path.w[2] > 0
+        bs = mi.BSDFSample3f()
+        bs.wo = mi.Vector3f(path.w[0], path.w[1], dr.select(flipped, -path.w[2], path.w[2]))
+        bs.eta = dr.select(reflected, 1.0, mi.Float(relative_index(layers.index[0], layers.index[-1])))
+        bs.pdf = dr.select(path.smooth, 1.0, proxy.density(layers, seen, path.w))
+        bs.sampled_component, bs.sampled_type, asked = self._drawn(reflected, path)
+        passed = active & (path.alive ^ True) & asked
+        if self.radiance:
+            weight /= bs.eta * bs.eta
+        return bs, mi.depolarizer(dr.select(passed, weight, 0))
+
+    def eval(self, wo: Any, active: Any) -> Any:
+        import drjit as dr
+
+        # Walk towards the upper side, by which light leaves
+        stack, mi, si, wi = self.stack, self.stack.mi, self.si, self.si.wi
+        flipped = wo.z < 0
+        active = active & self._asked(wi.z * wo.z > 0)
+        active = active & (True if stack.transmits else (wi.z > 0) & (wo.z > 0)) & stack.glossy
+        layers = stack.layers(si, active, flipped)
+        rng = stack.stream(wi.x, wi.y, wo.x, wo.y, si.p.x, si.p.y, si.p.z, si.uv.x, si.uv.y, wo.z)
+        out, rng = way_out(mi, layers, (wo.x, wo.y, dr.abs(wo.z)), rng)
+        seen = (wi.x, wi.y, dr.select(flipped, -wi.z, wi.z))
+        one = layers.start(mi.UnpolarizedSpectrum(1))
+        path = walk(mi, layers, seen, rng, one, active, stack.settings.max_depth, out, self._painted)
+        value = layers.seen(path.value, mi.UnpolarizedSpectrum)
+        # Turn energy into radiance
+        if stack.transmits and self.radiance:
+            scale = dr.select(seen[2] > 0, 1.0, relative_index(layers.index[0], layers.index[-1]))
+            value *= scale * scale
+        return mi.depolarizer(dr.select(active, value, 0))
+
+    def pdf(self, wo: Any, active: Any) -> Any:
+        import drjit as dr
+
+        stack, wi = self.stack, self.si.wi
+        flipped = wi.z < 0
+        active = active & self._asked(wi.z * wo.z > 0) & stack.glossy
+        active = active & (True if stack.transmits else (wi.z > 0) & (wo.z > 0))
+        layers = stack.layers(self.si, active, flipped)
+        turned = (wo.x, wo.y, dr.select(flipped, -wo.z, wo.z))
+        return dr.select(active, proxy.density(layers, (wi.x, wi.y, dr.abs(wi.z)), turned), 0)
+
+    def eval_pdf(self, wo: Any, active: Any) -> tuple[Any, Any]:
+        return self.eval(wo, active), self.pdf(wo, active)
+
+    def _wanted(self, kind: Any) -> bool:
+        return self.asked.get(kind, False)
+
+    def _asked(self, reflected: Any) -> Any:
+        """Whether any scattered light of that side is queried."""
+        flags = self.stack.mi.BSDFFlags
+        reflection = self._wanted(flags.GlossyReflection) or self._wanted(flags.DiffuseReflection)
+        transmission = self._wanted(flags.GlossyTransmission)
+        return (reflected & reflection) | ((reflected ^ True) & transmission)
+
+    @property
+    def _painted(self) -> bool | None:
+        """Whether scattered light is asked for of the base alone, or of all else; None for both."""
+        flags = self.stack.mi.BSDFFlags
+        diffuse = self._wanted(flags.DiffuseReflection)
+        return None if diffuse == self._wanted(flags.GlossyReflection) or not self.stack.painted else diffuse
+
+    def _drawn(self, reflected: Any, path: Path) -> tuple[Any, Any, Any]:
+        """Number and type of the component that a path belongs to, and whether it was asked for."""
+        import drjit as dr
+
+        mi, kinds, flags = self.stack.mi, self.stack.kinds, self.stack.mi.BSDFFlags
+        passed = reflected ^ True
+        belongs = {
+            flags.GlossyReflection: reflected & ((path.smooth | path.painted) ^ True),
+            flags.DeltaReflection: reflected & path.smooth,
+            flags.DiffuseReflection: reflected & path.painted,
+            flags.GlossyTransmission: passed & (path.smooth ^ True),
+            flags.DeltaTransmission: passed & path.smooth,
+        }
+        number, kind, asked = mi.UInt32(0), mi.UInt32(+kinds[0]), mi.Bool(False)
+        for k, each in enumerate(kinds):
+            number, kind = dr.select(belongs[each], k, number), dr.select(belongs[each], +each, kind)
+            asked |= belongs[each] & self._wanted(each)
+        return number, kind, asked
 
 
 def _widest(layer: LayerValues) -> float | None:

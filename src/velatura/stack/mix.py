@@ -25,7 +25,7 @@ DEEPEST = 4  # mixtures within each other
 MOST = 16  # stacks of a mixture, those of its mixtures included
 ROUNDING = 1e-6  # by which the sum of all weights may differ from 1
 
-WEIGHT = Scalar("share of the surface; the last part has what the others leave", low=0, high=1)
+WEIGHT = Scalar("share of the surface; the last part has what the others leave", low=0, high=1, typical=0.0)
 
 _PART = re.compile(r"part(\d{1,4})_(\w+)")
 
@@ -141,6 +141,16 @@ class Mix(Record):
         """
         weights = {at.name: at.plain(value, refusal) for at, value in self.values() if at.declared is WEIGHT}
         return [(share, stack) for share, (_, stack) in zip(self.shares(weights), self.leaves())]
+
+    def turned(self, degrees: float) -> Mix | None:
+        """All parts turned, as `Stack.turned`."""
+        parts = []
+        for part in self.mix:
+            material = part.material.turned(degrees)
+            if material is None:
+                return None
+            parts.append(part.model_copy(update={"material": material}))
+        return Mix(parts, name=self.name)
 
     # As a file holds it ----------------------------------------------------------------------------------------------
 

@@ -126,7 +126,7 @@ class Stack(Record):
         return Stack(layers, name=self.name if name is None else name, exterior=self.exterior, thin=self.thin)
 
     def turned(self, degrees: float) -> Stack | None:
-        """All layers turned, anticlockwise; None if no interface has axes, or one is turned by a texture."""
+        """All layers turned, anticlockwise, where they have axes; None if one is turned by a texture."""
         layers: list[Layer] = []
         for each in self.layers:
             if isinstance(each, Interface) and isinstance(each.alpha, tuple) and each.alpha[0] != each.alpha[1]:
@@ -134,7 +134,7 @@ class Stack(Record):
                     return None
                 each = each.model_copy(update={"rotation": each.rotation + degrees})
             layers.append(each)
-        return None if layers == list(self.layers) else self.with_layers(layers)
+        return self.with_layers(layers)
 
     # As a file holds it ----------------------------------------------------------------------------------------------
 
