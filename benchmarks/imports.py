@@ -104,8 +104,8 @@ def rows(path: Path, counts: dict[str, int], checked: bool) -> list[tuple[str, s
             report = vt.check(made.stack)
             laws = "kept" if report.passed else ", ".join(report.broken)
             counts["broken"] += not report.passed
-        layers = ", ".join(made.stack.kinds) + (", thin" if made.stack.thin else "")
-        found.append((name, layers, ", ".join(each.parameter for each in made.left), laws))
+        stacks = [", ".join(each.kinds) + (", thin" if each.thin else "") for _, each in made.stack.leaves()]
+        found.append((name, "; ".join(stacks), ", ".join(each.parameter for each in made.left), laws))
     return found
 
 
@@ -311,16 +311,22 @@ def with_darkening(
 
 @with_darkening
 def of_stack(source: Source, given: Values, cosine: float) -> Lobes:
-    """Energies, in the mean of colours, and roughness of the lobes of an imported stack."""
-    stack = source.reader.read(given).stack
-    found = vt.lobes(stack, cosine)
-    names = ["coat", "base"] if given.get(source.coat) else ["base"]
-    lobes: Lobes = {
-        name: (float(np.mean(energy)), float(np.mean(alpha)))
-        for name, energy, alpha in zip(names, found.energy, found.alpha)
+    """Energies, in the mean of colours, of the lobes of an imported material, and their mean roughness by energy."""
+    energies, alphas = dict.fromkeys(LOBES, 0.0), dict.fromkeys(LOBES, 0.0)
+    material = source.reader.read(given).stack
+    for share, stack in material.weighted("the benchmark has no images"):
+        found = vt.lobes(stack, cosine)
+        coated = bool(given.get(source.coat)) and not stack.name.startswith("uncoated")
+        for name, energy, alpha in zip(LOBES[not coated :], found.energy, found.alpha):
+            energies[name] += share * float(np.mean(energy))
+            alphas[name] += share * float(np.mean(energy)) * float(np.mean(alpha))
+        if stack.base:
+            energies["diffuse"] += share * float(np.mean(found.remainder))
+    return {
+        name: (energy, None if name == "diffuse" else alphas[name] / energy)
+        for name, energy in energies.items()
+        if energy
     }
-    rest = float(np.mean(found.remainder))
-    return {**lobes, "diffuse": (rest, None)} if stack.base else lobes
 
 
 @with_darkening

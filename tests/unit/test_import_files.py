@@ -16,6 +16,7 @@ import pytest
 
 import velatura as vt
 from velatura import imports, kernel
+from velatura.programs.values import texels
 
 Write = Callable[..., Path]
 
@@ -335,6 +336,84 @@ def test_cycles_are_left_out(write: Write) -> None:
     assert str(found.left[0]) == "coat_weight G: a cycle of nodes; its default stands for it"
 
 
+SURFACES = (
+    '<open_pbr_surface name="paint" type="surfaceshader"><input name="base_color" type="color3" value="0.1, 0.3, 0.6"/>'
+    '<input name="fuzz_weight" type="float" value="0.2"/></open_pbr_surface>'
+    '<standard_surface name="steel" type="surfaceshader"><input name="metalness" type="float" value="1"/>'
+    "</standard_surface>"
+)
+
+
+def mixed(share: str, fg: str = "paint", bg: str = "steel", name: str = "S") -> str:
+    sides = "".join(
+        f'<input name="{key}" type="surfaceshader" nodename="{of}"/>' for key, of in (("fg", fg), ("bg", bg))
+    )
+    return f'<mix name="{name}" type="surfaceshader">{sides}{share}</mix>'
+
+
+def of_surface(nodes: str) -> str:
+    return document(
+        f'{SURFACES}{nodes}<surfacematerial name="M" type="material">'
+        '<input name="surfaceshader" type="surfaceshader" nodename="S"/></surfacematerial>'
+    )
+
+
+def test_a_mix_of_surfaces_is_a_mixture(write: Write, tmp_path: Path) -> None:
+    """Expected: the stacks of both surfaces, the foreground by the share (MaterialX 1.39, "mix"); an image as it is."""
+    paint, steel = (vt.from_openpbr(base_color=(0.1, 0.3, 0.6)), imports.from_standard_surface(metalness=1))
+    found = imports.read(write("a.mtlx", of_surface(mixed(number("mix", 0.3)))))
+    mix: Any = found.stack
+    assert (mix.name, mix.source) == ("M", "imported from MaterialX")
+    assert [part.weight for part in mix.mix] == [0.3, None]
+    assert [part.material.layers for part in mix.mix] == [paint.stack.layers, steel.stack.layers]
+    assert [part.material.name for part in mix.mix] == ["paint", "steel"]
+    assert [each.parameter for each in found.left] == ["paint: fuzz_weight"]
+    kernel.mitsuba().Bitmap(np.array([[[0.0], [1.0]]], np.float32)).write(str(tmp_path / "mask.exr"))
+    image = '<image name="i" type="float"><input name="file" type="filename" value="mask.exr"/></image>'
+    masked: Any = imports.read(
+        write("a.mtlx", of_surface(image + mixed('<input name="mix" type="float" nodename="i"/>')))
+    )
+    weight = masked.stack.mix[0].weight
+    assert isinstance(weight, vt.Texture) and weight.texture == tmp_path / "mask.exr"
+    assert imports.read(write("a.mtlx", of_surface(mixed("")))).stack.layers == steel.stack.layers
+
+
+def test_mixes_of_mixes_are_read_once(write: Write) -> None:
+    """Expected: of forty nodes that each name the one before twice, the surface of the first."""
+    nodes = mixed(number("mix", 0.5), "paint", "paint", "m0")
+    nodes += "".join(mixed(number("mix", 0.5), f"m{n}", f"m{n}", f"m{n + 1}") for n in range(40))
+    found: Any = imports.read(write("a.mtlx", of_surface(nodes + mixed(number("mix", 0.25), "m40"))))
+    assert [part.material.name for part in found.stack.mix] == ["paint", "steel"]
+
+
+@pytest.mark.parametrize(
+    ("nodes", "message"),
+    [
+        (mixed("", bg="S"), "material M: a cycle of nodes"),
+        (mixed("", bg="other"), "material M: there is no node other"),
+        ('<mix name="S" type="surfaceshader"/>', "material M: the node S lacks fg"),
+        (
+            mixed("", bg="u") + '<surface_unlit name="u" type="surfaceshader"/>',
+            "material u: its surface surface_unlit is",
+        ),
+    ],
+)
+def test_mixes_of_other_surfaces_are_refused_in_one_line(write: Write, nodes: str, message: str) -> None:
+    path = write("a.mtlx", of_surface(nodes))
+    assert refusal(lambda: imports.read(path)).startswith(f"{path}: {message}")
+
+
+def test_modes_of_alpha_are_those_of_gltf(write: Write) -> None:
+    """Expected: the alpha where it is blended; all or nothing by the cutoff where it is a mask."""
+
+    def read(mode: int, alpha: float) -> Any:
+        inputs = number("alpha", alpha) + f'<input name="alpha_mode" type="integer" value="{mode}"/>'
+        return imports.read(write("a.mtlx", document(node(inputs + number("alpha_cutoff", 0.4), tag="gltf_pbr")))).stack
+
+    assert isinstance(read(0, 0.3), vt.Stack) and read(2, 0.3).mix[0].weight == 0.3
+    assert read(1, 0.5) == read(0, 0.5) and read(1, 0.3).interfaces[0].eta == 1.0
+
+
 # glTF ----------------------------------------------------------------------------------------------------------------
 
 GLTF: dict[str, Any] = {
@@ -407,7 +486,7 @@ def test_materials_of_gltf_are_read(write: Write, tmp_path: Path, ending: str) -
     assert base.alpha.curve and base.alpha.curve[-1] == 0.25
     left = {each.parameter: each.why for each in found.left}
     assert left.pop("baseColorTexture") == "inside the file, neither PNG nor JPEG: left out"
-    assert set(left) == {"normalTexture", "emissiveFactor", "alpha", "KHR_materials_unlit"}
+    assert set(left) == {"normalTexture", "emissiveFactor", "KHR_materials_unlit"}
     (film,) = imports.read(path, "material 1").stack.interfaces[0].films
     assert film.eta == 1.8 and isinstance(film.thickness_nm, vt.Texture)
     assert (film.thickness_nm.offset, film.thickness_nm.scale) == (pytest.approx(100), pytest.approx(300))
@@ -567,6 +646,29 @@ def test_images_inside_gltf_are_refused_in_one_line(write: Write, tmp_path: Path
     )
     assert changed(lambda it: it["images"][0].update(uri="data:;base64,A")) == "image 0: is not in base64"
     assert changed(lambda it: it["textures"][0].update(source=True)) == "images: has no entry of index True"
+
+
+@pytest.mark.parametrize("mode", ["OPAQUE", "MASK", "BLEND"])
+def test_alpha_of_gltf_is_the_share_that_is_there(write: Write, tmp_path: Path, mode: str) -> None:
+    """Expected: the factor times the alpha of the image; from the cutoff on 1, and 0 before, of a mask."""
+    rgba = np.zeros((1, 4, 4), np.uint8)
+    rgba[..., 3] = [0, 100, 200, 255]
+    kernel.mitsuba().Bitmap(rgba).write(str(tmp_path / "cover.png"))
+    material = {
+        "pbrMetallicRoughness": {"baseColorFactor": [1, 1, 1, 0.5], "baseColorTexture": {"index": 0}},
+        "alphaMode": mode,
+        "alphaCutoff": 0.25,
+    }
+    described = {"asset": {}, "images": [{"uri": "cover.png"}], "textures": [{"source": 0}], "materials": [material]}
+    found: Any = imports.read(write("a.gltf", json.dumps(described))).stack
+    if mode == "OPAQUE":
+        assert isinstance(found, vt.Stack)
+        return
+    weight = found.mix[0].weight
+    alpha = np.array([0, 100, 200, 255]) / 255 * 0.5
+    expected = alpha if mode == "BLEND" else alpha >= 0.25
+    np.testing.assert_allclose(texels(weight)[0, :, 0], expected, atol=1e-6)
+    assert found.mix[1].material.name == "nothing"
 
 
 # Mitsuba -------------------------------------------------------------------------------------------------------------

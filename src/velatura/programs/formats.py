@@ -12,8 +12,8 @@ from velatura import files
 from velatura.errors import Incomplete, InvalidInput, short
 from velatura.programs import FORMATS, embedded, reader
 from velatura.programs.imported import Imported, Left, Notes
-from velatura.stack import Stack, loads
-from velatura.stack.io import foreign
+from velatura.stack import loads
+from velatura.stack.io import Loaded, foreign
 from velatura.stack.schema import show, unknown
 
 LONGEST = 5000  # characters of a warning
@@ -61,8 +61,8 @@ def _held(path: Path) -> Imported | None:
     return Imported(stack, (Left("comment", embedded.KEY, embedded.READ),))
 
 
-def load(path: str) -> Stack:
-    """The stack nearest to a material of a file; one warning lists what that cannot carry.
+def load(path: str) -> Loaded:
+    """The stack or mixture nearest to a material of a file; one warning lists what that cannot carry.
 
     Raises:
         InvalidInput: as `read`.

@@ -13,11 +13,10 @@ from velatura.errors import InvalidInput
 from velatura.programs.imported import Notes, shown
 from velatura.programs.parameters import Input
 from velatura.programs.surface import INDICES
-from velatura.programs.values import Array, Value, changed, colour
+from velatura.programs.values import Array, Value, changed, colour, mean, rounded, texels
 from velatura.stack import RGB, Texture
 from velatura.stack.schema import show, unknown
 
-HALF = 0.5  # of a fraction: from there on it is taken as a whole
 ROUNDING = 0.02  # of values at the ends of their ranges, as colours have it that were converted
 
 
@@ -62,12 +61,19 @@ class Given:
         """A colour; the mean of an image."""
         return colour(self._plain(name))
 
-    def whole(self, name: str) -> bool:
-        """Whether a fraction is taken as 1: a stack is the same everywhere, and has no mixtures."""
-        value = self.number(name)
-        if 0 < value < 1:
-            self.notes.add(name, self._values[name], f"a stack is no mixture: taken as {int(value >= HALF)}")
-        return value >= HALF
+    def share(self, name: str) -> float | Texture:
+        """A share of a surface: a number, or an image of them unless that is the same everywhere."""
+        value = self[name]
+        if not isinstance(value, Texture):
+            if isinstance(value, tuple) and len(set(value)) > 1:
+                self.notes.add(name, value, "one share for all colours, their mean")
+            return float(np.mean(value))
+        found = np.clip(texels(value, self._declared[name].is_colour), 0, 1)
+        if np.ptp(found) == 0:
+            return rounded(float(found.flat[0]))
+        if np.ptp(found, axis=-1).max() > ROUNDING:
+            self.notes.add(name, value, "one share for all colours, that of green")
+        return value.model_copy(update={"channel": "g"}) if value.channel == "rgb" else value
 
     def leave(self, name: str, why: str) -> None:
         """Note a parameter that is not carried, unless it has its default value."""
@@ -115,9 +121,8 @@ class Given:
         value = self[name]
         if not isinstance(value, Texture):
             return value
-        mean = _mean(value, self._declared[name].is_colour)
         self.notes.add(name, value, "the mean of the image stands for it")
-        return mean
+        return mean(value, self._declared[name].is_colour)
 
     def _read(self, declared: Input, value: Any) -> Value:
         if isinstance(value, Mapping):
@@ -145,13 +150,3 @@ def is_number(value: object) -> bool:
         return not isinstance(value, bool) and isinstance(value, numbers.Real) and math.isfinite(value)
     except OverflowError:  # an integer that no float holds
         return False
-
-
-def _mean(texture: Texture, is_colour: bool) -> float | RGB:
-    """The mean of an image over its texels."""
-    from velatura import kernel
-    from velatura.binding.textures import texels as texels_of_file
-
-    texels = texels_of_file(kernel.mitsuba(), texture.texture.name, texture, is_colour)
-    mean = texture.scale * np.mean(texels, axis=(0, 1)) + texture.offset
-    return colour(mean if mean.size == 3 else float(mean[0])) if is_colour else float(np.mean(mean))

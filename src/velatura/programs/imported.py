@@ -1,11 +1,12 @@
-"""Results of imports: a stack, and a list of what the stack cannot carry."""
+"""Results of imports: a stack or a mixture, and a list of what stacks cannot carry."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 
 from velatura.errors import one_line, short
-from velatura.stack import Stack, Texture
+from velatura.stack import Texture
+from velatura.stack.io import Loaded
 
 MOST = 100  # characters of a name, and of a value
 
@@ -24,9 +25,9 @@ class Left:
 
 @dataclass(frozen=True)
 class Imported:
-    """The stack nearest to a material of another program, and what is left of that."""
+    """The stack or mixture nearest to a material of another program, and what is left of that."""
 
-    stack: Stack
+    stack: Loaded
     left: tuple[Left, ...] = ()
 
 

@@ -15,7 +15,7 @@ import numpy as np
 from velatura.optics import fresnel
 from velatura.programs.metals import of_f82_tint
 from velatura.programs.values import Array, Value, rounded
-from velatura.stack import RGB
+from velatura.stack import RGB, Texture
 
 INDICES = (0.1, 10.0)  # of dielectrics
 BRIGHTEST = 0.95  # reflectance of a dielectric at the normal
@@ -44,12 +44,12 @@ NO_COAT = Coat(1.0, (0.0, 0.0))
 
 @dataclass(frozen=True)
 class Surface:
-    """A base that is metal, diffuse below a dielectric, clear, or a mixture, with a film on it and a coat above.
+    """A base that is metal, diffuse below a dielectric, or clear, with a film on it and a coat above.
 
     Rotations are degrees from the tangent to the first axis, and indices are over the exterior.
 
     colour: reflectance of the metal at the normal; of what passes a dielectric base, the share that comes back.
-    metalness, clear: shares of the base that are metal, and that light passes.
+    metalness, clear: shares of the base that are metal, and that light passes; 0 or 1 of what is read.
     eta: index of a dielectric base; specular: a factor on its reflectance at the normal, by colours.
     edge: the tint of a metal, which `index` takes with its colour for the index.
     tint: the transmittance of each crossing of a clear base, of a pane as a whole.
@@ -77,6 +77,21 @@ class Surface:
     def coated(self) -> bool:
         """Whether a coat reflects as one of a higher index than the exterior's."""
         return self.coat.eta > 1
+
+
+@dataclass(frozen=True)
+class Shares:
+    """Shares of a surface: numbers, or images of them. All of a part of it are 0 or 1.
+
+    cover: that is there at all. coat, film: that has a coat, and a film on the base. metal: whose base is metal.
+    clear: of what is no metal, whose base light passes.
+    """
+
+    cover: float | Texture = 1.0
+    coat: float | Texture = 0.0
+    film: float | Texture = 0.0
+    metal: float | Texture = 0.0
+    clear: float | Texture = 0.0
 
 
 def weighed(eta: float, outside: float, weight: float) -> float:

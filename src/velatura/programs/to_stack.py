@@ -1,7 +1,9 @@
-"""The stack that comes nearest to a surface."""
+"""The stacks that come nearest to the parts of a surface, as one material."""
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -10,18 +12,52 @@ from velatura.model.registry import stack_lobes
 from velatura.optics import fresnel
 from velatura.programs.imported import Imported, Notes
 from velatura.programs.metals import MOST, of_edge
-from velatura.programs.surface import WHITE, Alpha, Coat, Surface, weighed
+from velatura.programs.mixture import beside
+from velatura.programs.surface import WHITE, Alpha, Coat, Shares, Surface, weighed
 from velatura.programs.values import Array, Value, changed, middle
-from velatura.stack import RGB, Diffuse, Film, Interface, Layer, Medium, Stack, Texture
+from velatura.stack import RGB, Described, Diffuse, Film, Interface, Layer, Medium, Stack, Texture
 from velatura.stack.coatings import STEP_MIN
 from velatura.stack.values import THICKEST_NM, cleaned
 
 SMOOTH = 1e-3  # roughness of a base that stands for one from a texture of roughness below it
 DARKEST = 1e-4  # transmittance in place of a smaller one
+NOTHING = Stack([Interface(eta=1.0, alpha=0.0)], name="nothing")  # lets all light through, unchanged
 
 
-def imported(surface: Surface, notes: Notes, name: str = "", source: str = "") -> Imported:
-    """The stack nearest to a surface; what had to be changed is added to the notes."""
+def imported(
+    surface: Callable[[Shares], Surface], shares: Shares, notes: Notes, name: str = "", source: str = ""
+) -> Imported:
+    """The material nearest to a surface: a stack, or a mixture of those of its parts.
+
+    surface: a part of it, by shares that are 0 or 1. What had to be changed is added to the notes.
+    """
+    if (plain := cleaned(name)) != name:
+        notes.add("name", plain, "control characters are left out")
+
+    def made(part: Shares) -> Described:
+        """The stack of a part, or a mixture by the first share between 0 and 1."""
+        if part.cover == 0:
+            return NOTHING
+        part = replace(part, clear=0.0) if part.metal == 1 else part
+        for which, share in vars(part).items():
+            if share not in (0, 1):
+                there, other = (made(replace(part, **{which: whole})) for whole in (1.0, 0.0))
+                return beside(share, there, other, notes)
+        return _stack(surface(part), notes).model_copy(update={"name": _called(part, shares)})
+
+    return Imported(made(shares).model_copy(update={"name": plain, "source": source}), notes.left)
+
+
+def _called(part: Shares, whole: Shares) -> str:
+    """The name of a part: its kind of base, and what sets it apart from other parts."""
+    words = {"coat": ("uncoated", "coated"), "film": ("plain", "iridescent"), "clear": ("opaque", "clear")}
+    if part.metal:
+        del words["clear"]
+    apart = [words[key][int(getattr(part, key))] for key in words if getattr(whole, key) not in (0, 1)]
+    return " ".join([*apart, "metal" if part.metal else "dielectric"])
+
+
+def _stack(surface: Surface, notes: Notes) -> Stack:
     coat = _coat(surface.coat)
     above = [layer for layer in coat if isinstance(layer, Interface)]
     outside = float(above[0].eta) if above else 1.0  # type: ignore[arg-type]
@@ -34,9 +70,7 @@ def imported(surface: Surface, notes: Notes, name: str = "", source: str = "") -
         else:
             base.append(Diffuse(albedo=_diffuse(surface, above, base)))
     thin = bool(surface.pane and surface.clear and not surface.metalness)
-    if (plain := cleaned(name)) != name:
-        notes.add("name", plain, "control characters are left out")
-    return Imported(Stack([*coat, *base], name=plain, source=source, thin=thin), notes.left)
+    return Stack([*coat, *base], thin=thin)
 
 
 def _facets(alpha: Alpha, rotation: float) -> dict[str, Any]:

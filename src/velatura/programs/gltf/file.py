@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from velatura import files
+from velatura import files, kernel
 from velatura.errors import InvalidInput
 from velatura.programs import embedded
 from velatura.programs.given import is_number
@@ -20,7 +20,7 @@ from velatura.programs.gltf.images import Images
 from velatura.programs.gltf.parameters import CHANNELS, CLEARCOAT, CORE
 from velatura.programs.imported import Imported, Notes, shown
 from velatura.programs.surface import INDICES
-from velatura.programs.values import changed
+from velatura.programs.values import Value, changed
 from velatura.stack import Texture, loads
 from velatura.stack.schema import show
 from velatura.stack.text import parsed
@@ -119,13 +119,23 @@ def of_material(
         notes.add("anisotropyTexture", "an image", "the strength and the rotation beside it stand for it")
 
     # Cover, and extensions that are not read
-    if material.get("alphaMode", "OPAQUE") != "OPAQUE":
-        base = parts[CORE].get("baseColorFactor", (1, 1, 1, 1))
-        values["alpha"] = base[3] if len(base) > 3 and base[3] < 1 else 0.5
+    if (mode := material.get("alphaMode", "OPAQUE")) != "OPAQUE":
+        cutoff = _number(material, "alphaCutoff", 0.5)
+        values["alpha"] = gltf.covered(mode, _alpha(parts[CORE], notes, find), cutoff)
     known = {each.within for each in gltf.PARAMETERS if each.within} | {"KHR_materials_emissive_strength"}
     for part in sorted(set(extensions) - known):
         notes.add(part, "", "not read")
     return gltf.read(values, name, notes)
+
+
+def _alpha(core: Mapping[str, Any], notes: Notes, find: Callable[[Mapping[str, Any]], Path | str]) -> Value:
+    """The fourth component of the base colour, times the alpha of its image where that has one."""
+    base, key = core.get("baseColorFactor", ()), "baseColorTexture"
+    alpha = _number({"alpha": base[3]} if len(base) > 3 else {}, "alpha", 1.0)
+    texture = _texture(_holding(core[key], key), "a", key, notes, find) if key in core else None
+    if texture is None or not kernel.bitmap(texture.texture).has_alpha():
+        return alpha
+    return changed(texture, lambda x: alpha * x)
 
 
 def _holding(part: object, name: str) -> Mapping[str, Any]:

@@ -12,8 +12,9 @@ from velatura.programs.given import Given
 from velatura.programs.gltf import formulas, parameters
 from velatura.programs.imported import Imported, Notes
 from velatura.programs.parameters import GREATEST, Input
-from velatura.programs.surface import Coat, Surface
+from velatura.programs.surface import NO_COAT, Coat, Shares, Surface
 from velatura.programs.to_stack import imported
+from velatura.programs.values import Value, changed
 
 PARAMETERS = (
     *parameters.PARAMETERS,
@@ -39,33 +40,50 @@ def read(values: Mapping[str, Any], name: str = "", notes: Notes | None = None) 
     """
     notes = Notes() if notes is None else notes
     given = Given(values, PARAMETERS, IGNORED, notes)
+    metal = given.share("metallicFactor")
+    shares = Shares(
+        cover=given.share("alpha"),
+        coat=given.share("clearcoatFactor"),
+        film=given.share("iridescenceFactor"),
+        metal=metal,
+        clear=given.share("transmissionFactor") if metal != 1 else 0.0,
+    )
+    given.leave("sheenColorFactor", parts.FIBRES)
+    given.leave("emissiveFactor", parts.LIGHT)
+    given.leave("diffuseTransmissionFactor", parts.OPAQUE)
+    return imported(lambda part: _surface(given, part), shares, notes, name, "imported from glTF")
+
+
+def covered(mode: str, alpha: Value, cutoff: float) -> Value:
+    """The share of a surface that is there, by a mode of alpha."""
+    if mode == "MASK":
+        return changed(alpha, lambda a: (a >= cutoff).astype(float))
+    return alpha if mode == "BLEND" else 1.0
+
+
+def _surface(given: Given, part: Shares) -> Surface:
+    """A part of the surface."""
     base: dict[str, Any] = {"colour": given["baseColorFactor"]}
-    if given.whole("metallicFactor"):
+    if part.metal:
         base["metalness"] = 1.0
     else:
         share, tint = given.number("specularFactor"), given.colour("specularColorFactor")
         base["specular"] = given.tinted("specularColorFactor", share, tint)
-        if given.whole("transmissionFactor"):
+        if part.clear:
             pane = given.number("thicknessFactor") == 0
             base |= {"clear": 1.0, "tint": given["baseColorFactor"], "pane": pane}
             _inside(given, pane)
     thickness_nm = given["iridescenceThicknessMaximum"]  # without an image, which is between both
-    strength, weight = given.number("anisotropyStrength"), given.number("clearcoatFactor")
-    coat = Coat(COAT, parts.alike(given["clearcoatRoughnessFactor"]) if weight else (0.0, 0.0))
-    surface = Surface(
+    strength = given.number("anisotropyStrength")
+    return Surface(
         alpha=parts.alphas(given["roughnessFactor"], lambda r: formulas.alphas(r, strength)),
         rotation=float(np.degrees(given.number("anisotropyRotation"))) if strength else 0.0,
         eta=given.index("ior"),
-        film=(given.index("iridescenceIor"), thickness_nm) if given.whole("iridescenceFactor") else None,
-        coat=parts.coated(notes, "clearcoatFactor", weight, coat),
+        film=(given.index("iridescenceIor"), thickness_nm) if part.film else None,
+        coat=Coat(COAT, parts.alike(given["clearcoatRoughnessFactor"])) if part.coat else NO_COAT,
         by_sight=True,
         **base,
     )
-    given.leave("sheenColorFactor", parts.FIBRES)
-    given.leave("emissiveFactor", parts.LIGHT)
-    given.leave("alpha", parts.COVERS)
-    given.leave("diffuseTransmissionFactor", parts.OPAQUE)
-    return imported(surface, notes, name, "imported from glTF")
 
 
 def _inside(given: Given, pane: bool) -> None:

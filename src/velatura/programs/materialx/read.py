@@ -13,15 +13,18 @@ import numpy as np
 from velatura import files
 from velatura.errors import InvalidInput, within
 from velatura.programs import xml
+from velatura.programs.given import Given
 from velatura.programs.gltf import read as gltf
 from velatura.programs.imported import Imported, Notes
+from velatura.programs.mixture import beside
 from velatura.programs.openpbr import read as openpbr
+from velatura.programs.parameters import Input
 from velatura.programs.principled import read as principled
 from velatura.programs.principled.formulas import COAT_ALPHA
 from velatura.programs.standard_surface import read as standard_surface
 from velatura.programs.values import Value, changed, colour, linear, listed
 from velatura.programs.xml import Element
-from velatura.stack import Texture
+from velatura.stack import Described, Texture
 from velatura.stack.schema import show, unknown
 
 SHADERS = {
@@ -44,7 +47,7 @@ _FACTORS = [name for name in (*(each.name for each in gltf.PARAMETERS), *gltf.IG
 RENAMED: Mapping[str, Mapping[str, str | None]] = {
     "gltf_pbr": {
         **{_input_of(name): name for name in _FACTORS},
-        **dict.fromkeys(("tangent", "alpha_cutoff", "sheen_roughness", "emissive_strength")),
+        **dict.fromkeys(("tangent", "sheen_roughness", "emissive_strength")),
     },
     "disney_principled": {
         "baseColor": "base_color",
@@ -62,6 +65,7 @@ DEFAULTS: Mapping[str, Mapping[str, Any]] = {
     "gltf_pbr": {"iridescenceThicknessMaximum": 100.0},
     "disney_principled": {"base_color": 0.16, "clearcoat_gloss": 1.0, "sheen_tint": 0.5},
 }
+_COVER, _MODES = {"alpha_mode": 0.0, "alpha_cutoff": 0.5}, {1.0: "MASK", 2.0: "BLEND"}  # inputs of gltf_pbr
 IMAGES = ("image", "tiledimage", "gltf_image", "gltf_colorimage")
 DEEPEST = 64  # nodes in a row
 LINEAR_FROM_ACESCG = np.array(  # primaries AP1 and white of ACES to those of sRGB, adapted by Bradford's matrix
@@ -119,23 +123,78 @@ def _document(path: Path) -> Element:
 
 
 def _material(element: Element, path: Path, notes: Notes) -> Imported:
-    surface, name = element, element.name
+    surface = element
     if element.tag == "surfacematerial":
         for each in element.of("input"):
             if each.name == "displacementshader" and (height := each.get("nodename") or each.get("nodegraph")):
                 notes.add(each.name, height, "a stack has no height")
         entry = element.child("input", "surfaceshader")
         if entry is None:
-            raise InvalidInput(f"{path}: material {name}: has no surface")
-        try:
-            surface = _node(entry)
-        except _Unread as error:
-            raise InvalidInput(f"{path}: material {name}: {error}") from None
+            raise InvalidInput(f"{path}: material {element.name}: has no surface")
+        surface = _connected(entry, path, element.name)
+    if surface.tag == "mix":
+        mixed = _Mixed(path, element.name, notes)(surface)
+        return Imported(
+            mixed.model_copy(update={"name": element.name, "source": "imported from MaterialX"}), notes.left
+        )
+    return _surface(surface, path, element.name, notes)
+
+
+def _connected(entry: Element, path: Path, name: str) -> Element:
+    """The node of a surface that an input of a material is connected to."""
+    try:
+        return _node(entry)
+    except _Unread as error:
+        raise InvalidInput(f"{path}: material {name}: {error}") from None
+
+
+class _Mixed:
+    """Surfaces, and mixtures of them by nodes `mix`, of one material, each read once."""
+
+    def __init__(self, path: Path, name: str, notes: Notes) -> None:
+        self._path, self._name, self._notes = path, name, notes
+        self._reader = _Reader(path, notes)
+        self._found: dict[int, Described | None] = {}  # None of nodes that are being read
+
+    def __call__(self, node: Element) -> Described:
+        if id(node) not in self._found:
+            self._found[id(node)] = None
+            self._found[id(node)] = self._mix(node) if node.tag == "mix" else self._surface(node)
+        found = self._found[id(node)]
+        if found is None:
+            raise InvalidInput(f"{self._path}: material {self._name}: a cycle of nodes")
+        return found
+
+    def _mix(self, node: Element) -> Described:
+        inputs = {each.name: each for each in node.of("input")}
+        share: Any = 0.0
+        if "mix" in inputs:
+            try:
+                share = self._reader.value(inputs["mix"], "mix")
+            except _Unread as error:
+                self._notes.add(f"{node.name}: mix", inputs["mix"].get("value"), f"{error}; its default stands for it")
+        share = Given({"mix": share}, (Input("mix", 0.0),), {}, self._notes).share("mix")
+        if lacking := next((key for key in ("fg", "bg") if key not in inputs), None):
+            raise InvalidInput(f"{self._path}: material {self._name}: the node {node.name} lacks {lacking}")
+        first, second = (self(_connected(inputs[key], self._path, self._name)) for key in ("fg", "bg"))
+        return beside(share, first, second, self._notes)
+
+    def _surface(self, node: Element) -> Described:
+        notes = Notes()
+        found = _surface(node, self._path, node.name, notes).stack
+        for each in notes.left:
+            self._notes.add(f"{node.name}: {each.parameter}", each.value, each.why)
+        plain: Described = found.model_copy(update={"source": ""})
+        return plain
+
+
+def _surface(surface: Element, path: Path, name: str, notes: Notes) -> Imported:
     if surface.tag not in SHADERS:
-        raise InvalidInput(f"{path}: material {name}: its surface {surface.tag} is none of {', '.join(SHADERS)}")
+        read = f"none of {', '.join(SHADERS)}, nor a mix of these"
+        raise InvalidInput(f"{path}: material {name}: its surface {surface.tag} is {read}")
     values: dict[str, Any] = dict(DEFAULTS.get(surface.tag, {}))
     source, renamed = SHADERS[surface.tag], RENAMED.get(surface.tag, {})
-    known = [*renamed, *(each.name for each in source.PARAMETERS), *getattr(source, "IGNORED", ()), "alpha_mode"]
+    known = [*renamed, *(each.name for each in source.PARAMETERS), *getattr(source, "IGNORED", ()), *_COVER]
     reader = _Reader(path, notes)
     for each in surface.of("input"):
         parameter = renamed.get(each.name, each.name)
@@ -155,8 +214,9 @@ def _material(element: Element, path: Path, notes: Notes) -> Imported:
             notes.add(each.name, connected or each.get("value"), f"{error}; its default stands for it")
             continue
         values[parameter] = value
-    if not values.pop("alpha_mode", 0.0):
-        values.pop("alpha", None)
+    mode, cutoff = (values.pop(key, default) for key, default in _COVER.items())
+    if "alpha" in values:
+        values["alpha"] = gltf.covered(_MODES.get(mode, ""), values["alpha"], float(np.mean(cutoff)))
     if "eta" in values and "specular" in values:  # the node has one for what passes, and one for what is reflected
         values.pop("specular" if values.get("spec_trans") else "eta")
     if surface.tag == "disney_principled":

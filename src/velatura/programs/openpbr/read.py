@@ -14,7 +14,7 @@ from velatura.programs.imported import Imported, Notes
 from velatura.programs.metals import of_f82_tint
 from velatura.programs.openpbr import formulas, parameters
 from velatura.programs.parameters import GREATEST, Input
-from velatura.programs.surface import WHITE, Alpha, Coat, Surface
+from velatura.programs.surface import NO_COAT, WHITE, Alpha, Coat, Shares, Surface
 from velatura.programs.to_stack import imported
 from velatura.programs.values import Value, changed, colour
 
@@ -42,37 +42,13 @@ def read(values: Mapping[str, Any], name: str = "", notes: Notes | None = None) 
     """
     notes = Notes() if notes is None else notes
     given = Given(values, PARAMETERS, IGNORED, notes)
-    thin = given.number("geometry_thin_walled") > 0
-    base: dict[str, Any]
-    if given.whole("base_metalness"):
-        base = {"metalness": 1.0, **_metal(given)}
-    else:
-        weight, tint = given.number("specular_weight"), given.colour("specular_color")
-        base = {"specular": given.tinted("specular_color", weight, tint)}
-        if given.whole("transmission_weight"):
-            base |= {"clear": 1.0, "tint": _tint(given, thin), "pane": thin}
-        else:
-            base["colour"] = _albedo(given)
-            given.leave("geometry_thin_walled", parts.OPAQUE)
-    weight, eta = given.number("coat_weight"), given.index("coat_ior")
-    surface = Surface(
-        alpha=_alpha(given, "specular_roughness"),
-        rotation=given.number("geometry_tangent"),
-        eta=given.index("specular_ior"),
-        film=_film(given),
-        coat=parts.coated(
-            notes,
-            "coat_weight",
-            weight,
-            Coat(
-                eta,
-                _alpha(given, "coat_roughness") if weight else (0.0, 0.0),
-                given.number("geometry_coat_tangent"),
-                colour=given["coat_color"] if weight else WHITE,
-                darkening=given.number("coat_darkening"),
-            ),
-        ),
-        **base,
+    metal = given.share("base_metalness")
+    shares = Shares(
+        cover=given.share("geometry_opacity"),
+        coat=given.share("coat_weight"),
+        film=given.share("thin_film_weight"),
+        metal=metal,
+        clear=given.share("transmission_weight") if metal != 1 else 0.0,
     )
     given.leave("specular_haze", "an interface has one lobe: left out")
     if given.number("specular_haze"):
@@ -80,8 +56,41 @@ def read(values: Mapping[str, Any], name: str = "", notes: Notes | None = None) 
     given.leave("specular_retroreflectivity", "facets send no light back: left out")
     given.leave("fuzz_weight", parts.FIBRES)
     given.leave("emission_luminance", parts.LIGHT)
-    given.leave("geometry_opacity", parts.COVERS)
-    return imported(surface, notes, name, "imported from OpenPBR")
+    return imported(lambda part: _surface(given, part), shares, notes, name, "imported from OpenPBR")
+
+
+def _surface(given: Given, part: Shares) -> Surface:
+    """A part of the surface."""
+    base: dict[str, Any]
+    if part.metal:
+        base = {"metalness": 1.0, **_metal(given)}
+    else:
+        weight, tint = given.number("specular_weight"), given.colour("specular_color")
+        thin = given.number("geometry_thin_walled") > 0
+        base = {"specular": given.tinted("specular_color", weight, tint)}
+        if part.clear:
+            base |= {"clear": 1.0, "tint": _tint(given, thin), "pane": thin}
+        else:
+            base["colour"] = _albedo(given)
+            given.leave("geometry_thin_walled", parts.OPAQUE)
+    return Surface(
+        alpha=_alpha(given, "specular_roughness"),
+        rotation=given.number("geometry_tangent"),
+        eta=given.index("specular_ior"),
+        film=_film(given) if part.film else None,
+        coat=_coat(given) if part.coat else NO_COAT,
+        **base,
+    )
+
+
+def _coat(given: Given) -> Coat:
+    return Coat(
+        given.index("coat_ior"),
+        _alpha(given, "coat_roughness"),
+        given.number("geometry_coat_tangent"),
+        colour=given["coat_color"],
+        darkening=given.number("coat_darkening"),
+    )
 
 
 def _alpha(given: Given, roughness: str) -> Alpha:
@@ -125,7 +134,5 @@ def _albedo(given: Given) -> Value:
     return given.blended("base_color", given.number("base_weight"), "subsurface_color", share)
 
 
-def _film(given: Given) -> tuple[float, Value] | None:
-    if not given.whole("thin_film_weight"):
-        return None
+def _film(given: Given) -> tuple[float, Value]:
     return given.index("thin_film_ior"), changed(given["thin_film_thickness"], lambda um: 1000 * um)

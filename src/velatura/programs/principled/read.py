@@ -14,7 +14,7 @@ from velatura.programs.given import Given
 from velatura.programs.imported import Imported, Notes
 from velatura.programs.parameters import Input
 from velatura.programs.principled import formulas, parameters
-from velatura.programs.surface import Coat, Surface
+from velatura.programs.surface import NO_COAT, Coat, Shares, Surface
 from velatura.programs.to_stack import imported
 from velatura.programs.values import changed
 from velatura.stack import RGB
@@ -36,31 +36,41 @@ def read(values: Mapping[str, Any], name: str = "", notes: Notes | None = None) 
         raise InvalidInput("eta: not together with specular; write one of them")
     given = Given({key: value for key, value in values.items() if key not in RATES}, PARAMETERS, {}, notes)
     eta = given.index("eta") if "eta" in values else 2 / (1 - np.sqrt(0.08 * given.number("specular"))) - 1
+    metal = given.share("metallic")
+    shares = Shares(coat=given.share("clearcoat"), metal=metal, clear=given.share("spec_trans") if metal != 1 else 0.0)
+    given.leave("sheen", parts.FIBRES)
+    given.leave("flatness", parts.LAMBERTIAN)
+    return imported(
+        lambda part: _surface(given, part, float(eta)), shares, notes, name, "imported from Mitsuba's principled"
+    )
+
+
+def _surface(given: Given, part: Shares, eta: float) -> Surface:
+    """A part of the surface."""
     base: dict[str, Any] = {"colour": given["base_color"]}
-    if given.whole("metallic"):
+    if part.metal:
         base["metalness"] = 1.0
     else:
         share = given.number("spec_tint")
         if share:
             red, green, blue = (1 - share + share * each for each in _hue(given))
             base["specular"] = given.tinted("spec_tint", 1.0, (red, green, blue))
-        if given.whole("spec_trans"):
+        if part.clear:
             base |= {"clear": 1.0, "tint": changed(given["base_color"], np.sqrt)}  # of each crossing
     anisotropic = given.number("anisotropic")
-    weight = given.number("clearcoat")
-    gloss = given.number("clearcoat_gloss") if weight else 0.0
-    rough, smooth = formulas.COAT_ALPHA
-    blur = rough + gloss * (smooth - rough)
-    surface = Surface(
+    return Surface(
         alpha=parts.alphas(given["roughness"], lambda r: burley(r, anisotropic)),
-        eta=float(eta),
-        coat=parts.coated(notes, "clearcoat", weight, Coat(COAT, (blur, blur))),
+        eta=eta,
+        coat=_coat(given) if part.coat else NO_COAT,
         by_sight=True,
         **base,
     )
-    given.leave("sheen", parts.FIBRES)
-    given.leave("flatness", parts.LAMBERTIAN)
-    return imported(surface, notes, name, "imported from Mitsuba's principled")
+
+
+def _coat(given: Given) -> Coat:
+    rough, smooth = formulas.COAT_ALPHA
+    blur = rough + given.number("clearcoat_gloss") * (smooth - rough)
+    return Coat(COAT, (blur, blur))
 
 
 def _hue(given: Given) -> RGB:

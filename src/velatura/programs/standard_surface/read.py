@@ -12,7 +12,7 @@ from velatura.programs.given import Given
 from velatura.programs.imported import Imported, Notes
 from velatura.programs.metals import of_edge_tint
 from velatura.programs.standard_surface.parameters import PARAMETERS as PARAMETERS
-from velatura.programs.surface import WHITE, Alpha, Coat, Surface
+from velatura.programs.surface import NO_COAT, WHITE, Alpha, Coat, Shares, Surface
 from velatura.programs.to_stack import imported
 from velatura.programs.values import Value, changed
 
@@ -28,9 +28,22 @@ def read(values: Mapping[str, Any], name: str = "", notes: Notes | None = None) 
     """
     notes = Notes() if notes is None else notes
     given = Given(values, PARAMETERS, IGNORED, notes)
-    weight, thin = given.number("coat"), given.number("thin_walled") > 0
+    metal = given.share("metalness")
+    shares = Shares(
+        cover=given.share("opacity"),
+        coat=given.share("coat"),
+        metal=metal,
+        clear=given.share("transmission") if metal != 1 else 0.0,
+    )
+    given.leave("sheen", parts.FIBRES)
+    given.leave("emission", parts.LIGHT)
+    return imported(lambda part: _surface(given, part), shares, notes, name, "imported from Standard Surface")
+
+
+def _surface(given: Given, part: Shares) -> Surface:
+    """A part of the surface. What a coat does to the base, it does where it is."""
     base: dict[str, Any]
-    if given.whole("metalness"):
+    if part.metal:
         share, (red, green, blue), edge = given.number("base"), given.colour("specular_color"), given.number("specular")
         base = {
             "metalness": 1.0,
@@ -41,34 +54,34 @@ def read(values: Mapping[str, Any], name: str = "", notes: Notes | None = None) 
     else:
         share, colour = given.number("specular"), given.colour("specular_color")
         base = {"specular": given.tinted("specular_color", share, colour)}
-        if given.whole("transmission"):
+        thin = given.number("thin_walled") > 0
+        if part.clear:
             base |= {"clear": 1.0, "tint": _tint(given, thin), "pane": thin}
         else:
-            base["colour"] = _albedo(given, 1 + weight * given.number("coat_affect_color"))
+            base["colour"] = _albedo(given, 1 + (given.number("coat_affect_color") if part.coat else 0.0))
             given.leave("thin_walled", parts.OPAQUE)
     thickness_nm = given["thin_film_thickness"]
-    affected = weight * given.number("coat_affect_roughness")
+    affected = given.number("coat_affect_roughness") if part.coat else 0.0
     affected = affected * given.number("coat_roughness") if affected else 0.0
     roughness = changed(given["specular_roughness"], lambda r: r + affected * (1 - r))
-    coat = Coat(
-        given.index("coat_IOR"),
-        _alpha(given["coat_roughness"], given.number("coat_anisotropy")) if weight else (0.0, 0.0),
-        360 * given.number("coat_rotation"),
-        given["coat_color"] if weight else WHITE,
-    )
-    surface = Surface(
+    return Surface(
         alpha=_alpha(roughness, given.number("specular_anisotropy")),
         rotation=360 * given.number("specular_rotation"),
         eta=given.index("specular_IOR"),
         film=(given.index("thin_film_IOR"), thickness_nm) if thickness_nm != 0 else None,
-        coat=parts.coated(notes, "coat", weight, coat),
+        coat=_coat(given) if part.coat else NO_COAT,
         by_sight=True,
         **base,
     )
-    given.leave("sheen", parts.FIBRES)
-    given.leave("emission", parts.LIGHT)
-    given.leave("opacity", parts.COVERS)
-    return imported(surface, notes, name, "imported from Standard Surface")
+
+
+def _coat(given: Given) -> Coat:
+    return Coat(
+        given.index("coat_IOR"),
+        _alpha(given["coat_roughness"], given.number("coat_anisotropy")),
+        360 * given.number("coat_rotation"),
+        given["coat_color"],
+    )
 
 
 def _alpha(roughness: Value, anisotropy: float) -> Alpha:
