@@ -26,7 +26,7 @@ from velatura.shader.lookups.columns import SolvedLookUp
 from velatura.shader.lookups.films import beside
 from velatura.shader.printers.c_like import CLike
 from velatura.shader.printers.glsl import GLSL
-from velatura.stack import Film, Interface, Kind, Material, Stack
+from velatura.stack import Film, Interface, Kind, Material, Mix, Stack
 
 Pattern: TypeAlias = tuple[tuple[Kind, ...], str]
 
@@ -69,9 +69,9 @@ ROOT_ALPHA_MAX = 0.97
 
 @dataclass(frozen=True)
 class Case:
-    """N random stacks of one pattern, with directions: single-precision values by name of the input."""
+    """N random stacks or mixtures of one pattern, with directions: single-precision values by name of the input."""
 
-    stack: Stack
+    stack: Any
     values: dict[str, np.ndarray]
     directions: dict[str, np.ndarray]
 
@@ -118,6 +118,45 @@ def coated(case: Case) -> Case:
         name: np.repeat(x[..., :1], x.shape[-1], axis=-1) if name in alike else x for name, x in case.values.items()
     }
     return replace(case, stack=stack, values=values)
+
+
+@dataclass(frozen=True)
+class MixedCase:
+    """A case of mixtures, and those of their stacks, each with the prefix of its values."""
+
+    whole: Case
+    parts: Sequence[tuple[str, Case]]
+
+    def in_numpy(self, model: str) -> Results:
+        """Weighted sums of values and densities, and samples of the part that the first number chooses; roughnesses
+        are those of all parts."""
+        u = self.whole.directions["u"]
+        begin, found = np.zeros_like(u[0]), list[Results]()
+        value, density, drawn = np.zeros_like(u), np.zeros_like(u[0]), np.zeros_like(u)
+        for share, (_, case) in zip(self.whole.stack.shares(self.whole.values), self.parts):
+            own = np.stack([np.clip((u[0] - begin) / share, 0, 1), *u[1:]])
+            case = replace(case, directions={**case.directions, "u": own})
+            found.append(in_numpy(case, record(case.stack, model)))
+            value, density = value + share * found[-1].value, density + share * found[-1].density
+            drawn = np.where(u[0] >= begin, found[-1].drawn, drawn)
+            begin = begin + share
+        return Results(np.empty((0, 3, u.shape[1])), np.concatenate([x.alpha for x in found]), value, density, drawn)
+
+
+def mixed_case(patterns: Sequence[Pattern], count: int, rng: np.random.Generator, films: bool = False) -> MixedCase:
+    """Mixtures of three patterns of stacks, of which the last two are a mixture within."""
+    cases = [random_case(pattern, count, rng) for pattern in patterns]
+    cases = [coated(case) for case in cases] if films else cases
+    a, b, c = (case.stack for case in cases)
+    weights = {name: rng.uniform(0.1, 0.7, count).astype(np.float32).astype(float) for name in WEIGHTS}
+    first, second = (float(weights[name][0]) for name in WEIGHTS)
+    mix = Mix([(first, a), (None, Mix([(second, b), (None, c)]))])
+    parts = [(prefix, replace(case, directions=cases[0].directions)) for prefix, case in zip(PARTS, cases)]
+    values = {prefix + name: x for prefix, case in parts for name, x in case.values.items()}
+    return MixedCase(Case(mix, {**weights, **values}, cases[0].directions), parts)
+
+
+WEIGHTS, PARTS = ("part0_weight", "part1_part0_weight"), ("part0_", "part1_part0_", "part1_part1_")
 
 
 def in_numpy(case: Case, recording: Recording) -> Results:
@@ -183,11 +222,12 @@ class Program:
         return Results(found[:n, :3], found[n:-2, :2], found[-2, :3], found[-2, 3], found[-1, :3])
 
 
-def program(case: Case, recording: Recording, made: Shader, printer: CLike = GLSL) -> Program:
-    """The calls of a shader in its language; they read the texture `vt_given`."""
-    energies = [f"l.{name}" for name in recording.lobes if name.endswith(".energy")]
-    energies = energies or [f"vt_energies(m, wi).parts[{k}]" for k in range(len(recording.energies))]
-    lobes = [f"l.{name.removesuffix('.alpha_u')}" for name in recording.lobes if name.endswith(".alpha_u")]
+def program(case: Case, recording: Recording | None, made: Shader, printer: CLike = GLSL) -> Program:
+    """The calls of a shader in its language, of a mixture without lobes; they read the texture `vt_given`."""
+    names, parts = (list(recording.lobes), len(recording.energies)) if recording else ([], 0)
+    energies = [f"l.{name}" for name in names if name.endswith(".energy")]
+    energies = energies or [f"vt_energies(m, wi).parts[{k}]" for k in range(parts)]
+    lobes = [f"l.{name.removesuffix('.alpha_u')}" for name in names if name.endswith(".alpha_u")]
     vec4 = printer.type("vec4")
     answers = [f"{vec4}({energy}, wi.x)" for energy in energies]  # wgpu fails for a constant beside a constant colour
     answers += [f"{vec4}({lobe}.alpha_u, {lobe}.alpha_v, 0.0, 0.0)" for lobe in lobes]
@@ -213,7 +253,7 @@ def textures(made: Shader) -> dict[str, np.ndarray]:
     return {name: data for name, data in read.items() if data is not None}
 
 
-def in_browser(case: Case, recording: Recording, made: Shader, browser: Browser) -> tuple[Results, float, float]:
+def in_browser(case: Case, recording: Recording | None, made: Shader, browser: Browser) -> tuple[Results, float, float]:
     """What the shader says, and milliseconds to compile and to draw; a row of pixels for each stack."""
     called = program(case, recording, made)
     cases = "\n".join(f"        case {j}: result = {answer}; break;" for j, answer in enumerate(called.answers))
@@ -235,7 +275,7 @@ void main() {{
     return called.results(drawn.pixels), drawn.linking, drawn.drawing
 
 
-def on_machine(case: Case, recording: Recording, made: Shader, machine: Machine) -> Results:
+def on_machine(case: Case, recording: Recording | None, made: Shader, machine: Machine) -> Results:
     """What the shader says in the language of a machine."""
     called = program(case, recording, made, machine.printer)
     (answers,) = together([called], made.text, machine, textures(made))

@@ -15,7 +15,7 @@ from velatura.shader.lookups.atlas import TableLayout
 from velatura.shader.lookups.columns import SolvedContents, SolvedLookUp
 from velatura.shader.lookups.lookup import Group, LookUp
 from velatura.shader.material import Brushed, Entry, Filled, Mapped
-from velatura.shader.printers.printer import ATOM, Output, Struct
+from velatura.shader.printers.printer import ATOM, Member, Output, Struct
 from velatura.shader.printers.statements import assignments, statements
 from velatura.shader.recorder.cost import Cost
 from velatura.shader.recorder.symbol import Kind, Operand, Symbol
@@ -66,7 +66,7 @@ class PythonPrinter(Printer):
         return f"vt_{table}({', '.join(args)})[0]"
 
     def film(self, table: str, args: Sequence[str]) -> str:
-        return f"vt_film({table!r}, {', '.join(args)})"
+        return f"vt_{table}({', '.join(args)})"
 
     # Statements
 
@@ -144,16 +144,19 @@ class PythonPrinter(Printer):
             for x in layouts
         )
 
-    def lookup(self, bake: LookUp) -> str:
+    def baked_texture(self, width: int, height: int) -> str:
+        return ""
+
+    def lookup(self, bake: LookUp, first: int) -> str:
+        read = f"vt_baked[{first}:{first + bake.height}, :{bake.nodes[0]}], {bake.nodes}, {bake.sides}"
         return "".join(
-            f"vt_baked_{x.name} = lambda *place: vt_read(vt_baked, {bake.nodes}, {bake.sides}, {tuple(x[1:])}, place)\n"
-            for x in bake.groups
+            f"vt_baked_{x.name} = lambda *place: vt_read({read}, {tuple(x[1:])}, place)\n" for x in bake.groups
         )
 
     def films(self, layouts: Sequence[TableLayout]) -> str:
-        each = (f"{x.name!r}: ({x.start}, {x.nodes})" for x in layouts)
-        look_up = "vt_film = lambda name, *at: vt_filmed(vt_films, *vt_placed[name], at)"
-        return f"vt_placed = {{{', '.join(each)}}}\n{look_up}\n"
+        return "".join(
+            f"vt_{x.name} = lambda *place: vt_filmed(vt_films, {x.start}, {x.nodes}, place)\n" for x in layouts
+        )
 
     def helpers(self, called: Set[tuple[str, Kind]]) -> str:
         return ""
@@ -171,6 +174,23 @@ class PythonPrinter(Printer):
     def sample(self, drawn: Sequence[Output]) -> str:
         return self._returned("def vt_sample(m, l, wi, u)", drawn)
 
+    def mixture(self, members: Sequence[Member]) -> str:
+        shares = assignments({f"l.{name}_share": (share, "number") for name, _, share in members}, self)
+        lobes = [f"l.{name} = vt_{own}lobes(m.{name}, wi)" for name, own, _ in members]
+        values = ", ".join(
+            f"(l.{name}_share, vt_{own}eval_pdf(m.{name}, l.{name}, wi, wo))" for name, own, _ in members
+        )
+        drawn = ", ".join(
+            f"(l.{name}_share, lambda u: vt_{own}sample(m.{name}, l.{name}, wi, u))" for name, own, _ in members
+        )
+        return "".join(
+            [
+                _function("def vt_lobes(m, wi)", ["l = VtLobes()", *shares, *lobes, "return l"]),
+                _function("def vt_eval_pdf(m, l, wi, wo)", [f"return vt_weighted({values})"]),
+                _function("def vt_sample(m, l, wi, u)", [f"return vt_chosen(u, {drawn})"]),
+            ]
+        )
+
     def _returned(self, head: str, outputs: Sequence[Output]) -> str:
         lines, texts = statements(outputs, self)
         return _function(head, [*lines, f"return {', '.join(texts)}"])
@@ -178,7 +198,14 @@ class PythonPrinter(Printer):
 
 def run(text: str, **given: Any) -> SimpleNamespace:
     """The functions of a program that was printed; textures and parameters are `given` by name."""
-    names = {"np": np, "vt_colour": _colour, "vt_mean": _mean, "vt_sqrt": _sqrt}
+    names = {
+        "np": np,
+        "vt_colour": _colour,
+        "vt_mean": _mean,
+        "vt_sqrt": _sqrt,
+        "vt_weighted": _weighted,
+        "vt_chosen": _chosen,
+    }
     program: dict[str, Any] = {**names, "vt_looked_up": _looked_up, "vt_read": _read, "vt_filmed": _filmed, **given}
     exec(compile(text, "<printed>", "exec"), program)
     return SimpleNamespace(**program)
@@ -218,6 +245,20 @@ def _mean(x: np.ndarray) -> np.ndarray:
 
 def _sqrt(x: Any) -> Any:
     return np.sqrt(np.maximum(x, 0))
+
+
+def _weighted(*parts: Any) -> tuple[Any, Any]:
+    """Value and density of parts, weighted by their shares."""
+    return sum(share * value for share, (value, _) in parts), sum(share * density for share, (_, density) in parts)
+
+
+def _chosen(u: np.ndarray, *parts: Any) -> np.ndarray:
+    """Directions of the part that the first number chooses, which is rescaled."""
+    begin, found = np.zeros_like(u[0]), np.zeros_like(u)
+    for share, sample in parts:
+        drawn = sample(np.stack([np.clip((u[0] - begin) / share, 0, 1), *u[1:]]))
+        found, begin = np.where(u[0] >= begin, np.stack(np.broadcast_arrays(*drawn)), found), begin + share
+    return found
 
 
 def _looked_up(texture: np.ndarray, start: int, nodes: tuple[int, ...], channels: int, place: Sequence[Any]) -> Any:

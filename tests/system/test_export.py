@@ -13,6 +13,7 @@ import sys
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
+from xml.etree import ElementTree
 
 import numpy as np
 import pytest
@@ -22,6 +23,7 @@ from velatura import kernel
 from velatura.bakes import TARGETS
 from velatura.exports import FORMATS
 from velatura.exports.request import headed
+from velatura.exports.shader import LANGUAGES
 from velatura.shader import shader
 from velatura.shader.lookups import atlas
 
@@ -175,6 +177,43 @@ def test_films_are_exported(to: str, run: Run, tmp_path: Path) -> None:
         wanted, shape = vt.bsdf(stack), '<shape type="sphere"><ref id="material"/></shape>'
         found = kernel.mitsuba().load_string(f'<scene version="3.0.0"><include filename="{path}"/>{shape}</scene>')
         assert str(found.shapes()[0].bsdf()) == str(wanted)
+
+
+PAINTED = """
+name: Worn paint
+mix:
+  - weight: {texture: mask.png, channel: g}
+    material: bare-gold
+  - weight: 0.25
+    material:
+      mix: [{weight: 0.5, material: varnished-paint}, {material: {layers: [diffuse: {albedo: 0.3}]}}]
+  - material: varnished-paint
+"""
+
+
+@pytest.mark.parametrize("to", ["json", "python", "mitsuba-xml", "glsl", "wgsl"])
+def test_mixtures_are_exported(to: str, run: Run, tmp_path: Path) -> None:
+    """Expected: files of a description read back as the mixture, its mask included; a shader has its weights."""
+    (tmp_path / "mask.png").touch()
+    (tmp_path / "worn.yaml").write_text(PAINTED, encoding="utf-8")
+    mix, path = vt.load(tmp_path / "worn.yaml"), tmp_path / f"worn{FORMATS[to].endings[0]}"
+    assert run("export", str(tmp_path / "worn.yaml"), "--to", to, "-o", str(path))[0] == 0
+    text = path.read_text(encoding="utf-8")
+    if to == "json":
+        found = json.loads(text)
+        assert vt.stack.loads(json.dumps(found["material"]), "worn.json", tmp_path) == mix
+        assert found["values"]["part1_part0_weight"] == 0.5 and "part0_weight" not in found["values"]
+    elif to == "python":
+        assert runpy.run_path(str(path))["mix"] == mix
+    elif to == "mitsuba-xml":
+        (material,) = (each for each in ElementTree.fromstring(text).iter("string") if each.get("name") == "material")
+        assert vt.stack.loads(material.get("value", ""), "worn.json", tmp_path) == mix
+    else:
+        made = shader(mix, printer=LANGUAGES[to]())
+        assert text == headed(made.text) and made.columns is not None
+        columns = np.frombuffer(path.with_suffix(".tables.bin").read_bytes(), "<f4")
+        np.testing.assert_array_equal(columns, made.columns.ravel())
+        assert list(made.maps) == ["vt_map_part0_weight"]
 
 
 @pytest.mark.parametrize("preset", PRESETS)

@@ -20,6 +20,7 @@ from agreement import (
     compare,
     differences,
     in_numpy,
+    mixed_case,
     of_material,
     on_machine,
     program,
@@ -102,6 +103,29 @@ def test_one_program_holds_two_materials(name: str) -> None:
         apart = differences(truth, called.results(answers))
         assert max(apart.energy, apart.alpha, apart.drawn) < 1e-4
         assert max(apart.value, apart.density) < 1e-3
+
+
+MIXED = {
+    "glsl450": ((9, 15, 9), "weier2020", False),
+    "vulkan": ((9, 0, 18), "velatura", False),
+    "hlsl": ((9, 18, 9), "belcour2018", True),
+    "slang": ((12, 18, 10), "yamaguchi2019", False),
+    "wgsl": ((0, 18, 9), "velatura", False),
+}
+
+
+@pytest.mark.parametrize("name", MIXED)
+def test_mixtures_in_every_language_are_the_model(name: str) -> None:
+    """Expected: values, densities and samples of random mixtures, one within another, within the bounds of stacks."""
+    machine, (patterns, model, films) = MACHINES[name], MIXED[name]
+    if why := machine.missing():
+        pytest.skip(why)
+    case = mixed_case([PATTERNS[k] for k in patterns], 60, np.random.default_rng(7), films)
+    made = shader(case.whole.stack, model, printer=machine.printer)
+    truth, found = case.in_numpy(model), on_machine(case.whole, None, made, machine)
+    apart = differences(truth, replace(found, energy=truth.energy, alpha=truth.alpha))
+    assert max(apart.value, apart.density) < 1e-3
+    assert apart.drawn < 1e-4
 
 
 BAKED = {

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from agreement import PATTERNS, coated, in_numpy, random_case
+from agreement import PATTERNS, coated, in_numpy, mixed_case, random_case
 from evaluation import evaluate
 from python_printer import PythonPrinter, put, run
 
@@ -55,6 +55,36 @@ def test_another_language_prints_the_same_functions(pattern, model: str, films: 
     np.testing.assert_allclose(np.broadcast_arrays(*drawn), truth.drawn, atol=1e-5 if solved else 1e-11)
 
 
+@pytest.mark.parametrize(
+    ("patterns", "model", "films"),
+    [
+        ((9, 15, 9), "weier2020", False),
+        ((12, 19, 20), "belcour2018", False),
+        ((9, 0, 18), "velatura", False),
+        ((9, 9, 9), "belcour2018", True),
+    ],
+)
+def test_a_mixture_is_the_weighted_sum_of_its_parts(patterns: tuple[int, ...], model: str, films: bool) -> None:
+    """Expected: value and density are weighted sums of those of the parts in NumPy; a sample is that of the part that
+    the first number chooses. Parts of one kind share their functions, where these read no tables of their own."""
+    case = mixed_case([PATTERNS[k] for k in patterns], 20, np.random.default_rng(7), films)
+    made = shader(case.whole.stack, model, printer=PYTHON)
+    solved = made.columns is not None
+    given = {"vt_baked": made.columns.astype(float)} if made.columns is not None else {}
+    given |= {} if made.films is None else {"vt_films": made.films.astype(float)}
+    program = run(made.text, vt_tables=made.tables.astype(float), **given)
+    m, (wi, wo, u) = program.VtMaterial(), (case.whole.directions[name] for name in ("wi", "wo", "u"))
+    for name, place in made.uniforms.items():
+        put(m, place, case.whole.values[name])
+    truth, lobes = case.in_numpy(model), program.vt_lobes(m, wi)
+    value, density = program.vt_eval_pdf(m, lobes, wi, wo)
+    loose = solved or films
+    np.testing.assert_allclose(np.broadcast_to(value, (3, 20)), truth.value, rtol=1e-5 if loose else 1e-9, atol=1e-8)
+    np.testing.assert_allclose(density, truth.density, rtol=1e-5 if loose else 1e-9, atol=1e-8)
+    np.testing.assert_allclose(program.vt_sample(m, lobes, wi, u), truth.drawn, atol=1e-5 if loose else 1e-9)
+    assert hasattr(program, "vt_part1_part1_lobes") == (loose or patterns[2] != patterns[0])
+
+
 def test_textures_and_brushing_are_read_where_the_material_is(tmp_path: Path) -> None:
     for name in ("scratches.png", "wood.png"):
         (tmp_path / name).touch()
@@ -77,6 +107,28 @@ def test_textures_and_brushing_are_read_where_the_material_is(tmp_path: Path) ->
     assert m.layer0.rotation == pytest.approx(60 + 90 + 10)
     np.testing.assert_allclose(m.layer0.eta.ravel(), [1.4, 1.5, 1.6])
     np.testing.assert_allclose(m.layer1.albedo.ravel(), [0.2, 1.0, 1.0])
+
+
+def test_weights_are_read_where_the_material_is(tmp_path: Path) -> None:
+    """Expected: shares of texels, divided by their sum where that exceeds 1; a constant weight is worked in."""
+    (tmp_path / "worn.png").touch()
+    mask = {"texture": str(tmp_path / "worn.png"), "channel": "g", "scale": 2.0}
+    paint = vt.Stack([vt.Interface(eta=1.5, alpha=0.1), vt.Diffuse(albedo=0.4)])
+    mix = vt.Mix([(mask, "bare-gold"), (0.5, paint), (None, paint)])
+    made = shader(mix, "weier2020", ["part1_weight"], printer=PYTHON)
+    assert "part1_weight" not in made.uniforms and list(made.maps) == ["vt_map_part0_weight"]
+    given = {"vt_map_part0_weight": lambda uv: [0.0, uv, 0.0, 1.0], "vt_tables": made.tables.astype(float)}
+    program, wi = run(made.text, **given), (np.zeros(1), np.zeros(1), np.ones(1))
+    for texel, expected in ((0.1, (0.2, 0.5, 0.3)), (0.5, (2 / 3, 1 / 3, 0.0))):
+        lobes = program.vt_lobes(program.vt_material(np.array([texel])), wi)
+        np.testing.assert_allclose(
+            np.ravel([lobes.part0_share, lobes.part1_share, lobes.part2_share]), expected, atol=1e-12
+        )
+    assert made.text.count("def vt_part") == 3 * 2  # paint and gold
+    with pytest.raises(vt.InvalidInput, match="constant: unknown parameter 'part2_weight'"):
+        shader(mix, "weier2020", ["part2_weight"])
+    with pytest.raises(vt.InvalidInput, match="uniforms: only of a single stack"):
+        shader(mix, values="uniforms")
 
 
 @pytest.mark.parametrize("name", ["coated-gold", "varnished-paint", "frosted-glass"])

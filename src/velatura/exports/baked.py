@@ -11,8 +11,8 @@ from velatura.stack import dumps
 
 def write(request: Request) -> Export:
     """The file of the program that has the format's name."""
-    made, program = bake(request.stack, request.to, request.model), TARGETS[request.to]
+    made, program = bake(request.material, request.to, request.model), TARGETS[request.to]
     folder = None if program.anywhere else request.folder
     files = {name: relative(image.texture.texture, folder) for name, image in made.images.items()}
-    text = program.text(made, json.loads(dumps(request.stack, "json", request.folder)), files)
+    text = program.text(made, json.loads(dumps(request.material, "json", request.folder)), files)
     return Export(text, notes=tuple(made.summary))

@@ -8,10 +8,10 @@ from velatura.shader.printers.osl import osl
 
 def write(request: Request) -> Export:
     """The script; the shader is in it, and in the file that is saved by Blender."""
-    made = osl(request.stack, request.model)
+    made = osl(request.material, request.model)
     return Export(
         _SCRIPT.format(
-            name=request.stack.name.strip() or "Velatura", turns=made.turns, shader=_literal(headed(made.text))
+            name=request.material.name.strip() or "Velatura", turns=made.turns, shader=_literal(headed(made.text))
         )
     )
 

@@ -97,7 +97,7 @@ def export(
             not hold.
     """
     from velatura.model import DEFAULT, named
-    from velatura.stack import single
+    from velatura.stack import load
     from velatura.stack.schema import unknown
 
     if to not in FORMATS:
@@ -109,9 +109,7 @@ def export(
         if name not in FORMATS[to].options:
             raise InvalidInput(f"{name}: only for {', '.join(taking(name))}, not for {to}")
     chosen = named(DEFAULT if model is None else model, **switches)
-    request = Request(
-        to, single(material, "export"), chosen, switches, None if folder is None else Path(folder), options
-    )
+    request = Request(to, load(material), chosen, switches, None if folder is None else Path(folder), options)
     written: Export = import_module(FORMATS[to].module).write(request)
     return written
 

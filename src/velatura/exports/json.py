@@ -14,10 +14,10 @@ from velatura.stack import Varying, dumps
 def write(request: Request) -> Export:
     """`material` as its file would have it, with paths relative to its folder or the current one, `model` with all
     switches, and `values` by flat name."""
-    free = [(address, value) for address, value in request.stack.values() if not isinstance(value, Varying)]
+    free = [(address, value) for address, value in request.material.values() if not isinstance(value, Varying)]
     numbers = {address.name: constant(address, value) for address, value in free}
     report = {
-        "material": json.loads(dumps(request.stack, "json", request.folder or Path())),
+        "material": json.loads(dumps(request.material, "json", request.folder or Path())),
         "model": {"name": request.model.name, **{switch: getattr(request.model, switch) for switch in SWITCHES}},
         "values": {name: value if isinstance(value, float) else value.tolist() for name, value in numbers.items()},
     }

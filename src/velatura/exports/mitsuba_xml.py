@@ -11,7 +11,7 @@ from velatura.stack import dumps
 
 def write(request: Request) -> Export:
     """The BSDF `material`; its textures are named relative to the scene's folder, where Mitsuba looks for them."""
-    material = json.dumps(json.loads(dumps(request.stack, "json", request.folder)), ensure_ascii=False)
+    material = json.dumps(json.loads(dumps(request.material, "json", request.folder)), ensure_ascii=False)
     strings = {"material": material, "model": request.model.name, **request.switches}
     lines = [f'        <string name="{key}" value={quoteattr(text)}/>' for key, text in strings.items()]
     head = "<!-- Needs the plugins of Velatura: import velatura; velatura.register() -->"

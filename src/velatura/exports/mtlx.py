@@ -17,7 +17,7 @@ from velatura.shader.printers import mtlx
 from velatura.shader.printers.nodes import constant
 from velatura.shader.program import described
 from velatura.shader.recorder import recording
-from velatura.stack import Address, Stack, Varying
+from velatura.stack import Address, Stack, Varying, single
 
 LINE = 110  # characters of comments
 
@@ -28,7 +28,7 @@ def write(request: Request) -> Export:
     Raises:
         InvalidInput: as `velatura.shader.printers.mtlx.record`.
     """
-    stack = request.stack
+    stack = single(request.material, "mtlx")
     recorded = mtlx.record(stack, recording.drawn_by(stack, request.model))
     name = identifier(stack)
     node = f"velatura_lobes_{name}"
@@ -65,7 +65,7 @@ def write(request: Request) -> Export:
 
 
 def _about(request: Request) -> list[str]:
-    stack, varying = request.stack, not recording.is_uniform(request.stack)
+    stack, varying = request.material, not recording.is_uniform(request.material)
     over = "computed from the values of layers, which are inputs" if varying else "polynomials of the direction of view"
     text = (
         f"Weights and roughnesses of its lobes are {over}. All targets but genosl are taken to return the light that"

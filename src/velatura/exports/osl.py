@@ -8,4 +8,4 @@ from velatura.shader.printers.osl import osl
 
 def write(request: Request) -> Export:
     """A shader with one output, a sum of closures; it holds all tables that it reads."""
-    return Export(headed(osl(request.stack, request.model, request.constants).text))
+    return Export(headed(osl(request.material, request.model, request.constants).text))

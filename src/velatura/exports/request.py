@@ -15,20 +15,20 @@ from velatura.version import __version__
 
 if TYPE_CHECKING:
     from velatura.model import Model
-    from velatura.stack import Stack
+    from velatura.stack import Described
 
 LICENCE = "BSD-3-Clause"  # of code that is written
 
 
 @dataclass(frozen=True)
 class Request:
-    """A request for an export: a format, a stack, the model with its changed switches, and the format's options.
+    """A request for an export: a format, a material, the model with its changed switches, and the format's options.
 
     Paths of textures are relative to `folder`, where the format allows that; absolute without one.
     """
 
     to: str
-    stack: Stack
+    material: Described
     model: Model
     switches: Mapping[str, str]
     folder: Path | None
@@ -42,7 +42,7 @@ class Request:
         asked: Collection[str] = self.options.get("constant", ())
         if list(asked) != ["all"]:
             return asked
-        return [name for name, value in self.stack.flat().items() if not isinstance(value, Varying)]
+        return [name for name, value in self.material.flat().items() if not isinstance(value, Varying)]
 
 
 @dataclass(frozen=True)

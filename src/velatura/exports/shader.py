@@ -30,7 +30,7 @@ def write(request: Request) -> Export:
     printer = LANGUAGES[request.to](options.get("group", 0), options.get("binding", 0), half)
     prefix = options.get("prefix", PREFIX)
     made = shader(
-        request.stack,
+        request.material,
         request.model,
         request.constants,
         printer=printer,

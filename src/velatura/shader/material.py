@@ -3,15 +3,17 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from velatura.shader.printers.printer import Field, Struct
 from velatura.shader.recorder.symbol import Operand, operand
-from velatura.stack import Address, Brushing, Stack, Texture, Varying
+from velatura.stack import Address, Brushing, Described, Stack, Texture, Varying
 from velatura.stack import number as plain
+from velatura.stack.flat_names import prefix
+from velatura.stack.mix import WEIGHT
 
 PARAMETERS = "vt_parameters"  # in the code: the values that change
 
@@ -51,19 +53,28 @@ class Filled(NamedTuple):
     parameters: bool
 
 
-def title(stack: Stack) -> str:
+def title(stack: Described) -> str:
     """The name of a material; that it is one, without a name."""
     return stack.name.strip() or "A material"
 
 
-def identifier(stack: Stack) -> str:
+def identifier(stack: Described) -> str:
     """The name of a material in lower-case letters, digits and underscores."""
     return re.sub(r"\W+", "_", stack.name.lower(), flags=re.ASCII).strip("_") or "material"
 
 
 def place(address: Address) -> str:
-    """Where a value lies in the struct: `layer0.eta` for `layer0_eta`."""
-    return address.key if address.layer is None else f"layer{address.layer}.{address.key}"
+    """Where a value lies in the struct: `layer0.eta` for `layer0_eta`, `part0_part1.layer0.eta` of a mixture, whose
+    weights lie in the struct itself."""
+    if address.declared is WEIGHT:
+        return address.name
+    own = address.key if address.layer is None else f"layer{address.layer}.{address.key}"
+    return f"{member(address.parts)}.{own}" if address.parts else own
+
+
+def member(parts: Sequence[int]) -> str:
+    """The member of the structs that holds what belongs to a stack of a mixture."""
+    return prefix(parts).rstrip("_")
 
 
 def constant(address: Address, value: Any) -> Any:
@@ -88,18 +99,18 @@ def structs(stack: Stack, read: Sequence[str]) -> list[Struct]:
     return [*layers, Struct("VtMaterial", members, "indices are absolute, rotations in degrees")]
 
 
-def filled(stack: Stack, read: Sequence[str], parameters: bool) -> Filled:
-    """The contents of the struct; with `parameters`, plain values are those of a uniform."""
+def filled(stack: Described, read: Collection[str], parameters: bool) -> Filled:
+    """The contents of the struct: values that are read; with `parameters`, plain ones are those of a uniform."""
     images = _images(stack, read)
     entries = [
         Entry(place(address), _value(address, value, images), address.colour)
         for address, value in stack.values()
-        if (address.layer is None or address.name in read) and (isinstance(value, Varying) or not parameters)
+        if (address.key == "exterior" or address.name in read) and (isinstance(value, Varying) or not parameters)
     ]
     return Filled(entries, {sampler: image for image, sampler in images.items()}, parameters)
 
 
-def _images(stack: Stack, read: Sequence[str]) -> dict[Texture, str]:
+def _images(stack: Described, read: Collection[str]) -> dict[Texture, str]:
     """The samplers of the textures, named after the first value that reads each."""
     images: dict[Texture, str] = {}
     for name, value in stack.flat().items():

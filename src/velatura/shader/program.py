@@ -7,6 +7,7 @@ import re
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from itertools import accumulate
 from typing import Literal
 
 import numpy as np
@@ -14,15 +15,17 @@ import numpy as np
 from velatura.errors import InvalidInput, remark
 from velatura.model import DEFAULT, SWITCHES, Model, named
 from velatura.model.papers.lobe_merging import merging
-from velatura.shader import material
 from velatura.shader.lookups import atlas, films
-from velatura.shader.lookups.lookup import LookUp
+from velatura.shader.lookups.lookup import LookUp, stacked
+from velatura.shader.material import filled as contents
+from velatura.shader.material import title
+from velatura.shader.mixture import Mixture
+from velatura.shader.part import PartCode
 from velatura.shader.printers.glsl import GLSL
-from velatura.shader.printers.printer import Field, Printer, Struct
-from velatura.shader.recorder.cost import Cost, cost
-from velatura.shader.recorder.recording import Recording, record
-from velatura.shader.recorder.seen import part
-from velatura.stack import MaterialLike, Texture, single
+from velatura.shader.printers.printer import Printer
+from velatura.shader.recorder.cost import Cost
+from velatura.shader.recorder.recording import Recording, check_constant
+from velatura.stack import MaterialLike, Mix, Texture, load
 
 PREFIX = "vt"  # of names in code
 _PREFIX = re.compile(r"(?!gl_)[A-Za-z](_?[A-Za-z0-9])*")
@@ -37,11 +40,12 @@ class Shader:
     and where they lie in the struct (`layer0.eta`). `maps` are the textures of the material by sampler.
 
     Where values are parameters: `shown` names the lobes that `vt_shown` weighs, in order, and `baked` is what works out
-    the lobes for the texture `vt_baked`, None where a texture makes them differ from point to point. A solved material
-    always has one; `columns` is the texture of a single one.
+    the lobes for the texture `vt_baked`, None where a texture makes them differ from point to point, and of a mixture.
+    A solved material always has one; `columns` is the texture `vt_baked` of known values, float32 of shape (height,
+    width, 4).
     `film_tables` names the tables of thin films that the code, or `baked`, looks up in the texture `vt_films`.
-    `lobes` are the layers whose light each reflected lobe is, seen from above; `shares` names the energies or chances,
-    fields of `VtLobes`, by which `vt_sample` divides its first number, in order.
+    `lobes` are the layers whose light each reflected lobe is, seen from above, of a stack; `shares` names the energies
+    or chances, fields of `VtLobes`, by which `vt_sample` divides its first number, in order.
     `costs` are those of `vt_lobes`, `vt_eval_pdf` and `vt_sample`, each called once; `shared` says whether the texture
     of tables is the same for all materials.
     """
@@ -54,6 +58,7 @@ class Shader:
     shown: Sequence[str]
     shares: Sequence[str]
     baked: LookUp | None
+    columns: np.ndarray | None
     film_tables: Sequence[str]
     films: np.ndarray | None  # their texture, float32 of shape (height, width, 4); None without any
     costs: Mapping[str, Cost]
@@ -63,11 +68,6 @@ class Shader:
     def tables(self) -> np.ndarray:
         """The texture of the tables that are looked up, or of all, float32 of shape (height, width, 4)."""
         return atlas.texture(atlas.every() if self.shared else self.looked_up)
-
-    @property
-    def columns(self) -> np.ndarray | None:
-        """The texture `vt_baked` of known values, float32 of shape (height, width, 4)."""
-        return self.baked.known if self.baked else None
 
     @cached_property
     def key(self) -> str:
@@ -89,9 +89,12 @@ def shader(
 ) -> Shader:
     """A material as shader code: the structs `VtMaterial` and `VtLobes`, and functions on them.
 
+    A mixture has functions of its parts, shared by those whose stacks are of the same kinds, and functions that weigh
+    them.
+
     Args:
-        stack: a material (a stack, a file, or a preset's name). Its kinds of layers make the code; its values go into
-            `vt_material`, which gives them.
+        stack: a material (a stack, a mixture, a file, or a preset's name). Its kinds of layers make the code; its
+            values go into `vt_material`, which gives them.
         constant: flat names of values that never change, which are worked out now and are not in the struct. Of a
             material that is solved, all are.
         values: plain values as `literals`, or as `uniforms` that a user changes; then the code is the same for all
@@ -103,47 +106,62 @@ def shader(
         baking: whether lobes are read from a texture over direction for any model, of values that never change.
 
     Raises:
-        InvalidInput: as `record`; a prefix that names cannot begin with.
+        InvalidInput: as `record`; a prefix that names cannot begin with; a mixture as `uniforms`.
     """
     if not _PREFIX.fullmatch(prefix):
         raise InvalidInput(f"prefix: must be letters, digits and single underscores, a letter first, not {prefix!r}")
-    stack = single(stack, "shader code")
-    recording = record(stack, model, constant, values == "uniforms", baking, **switches)
-    baked, read, shown = recording.baked, list(recording.read), recording.shown
-    looked_up = {symbol.detail for symbol in recording.symbols if symbol.op in ("texels", "value")}
-    layouts, filled = (
-        atlas.layouts(looked_up, atlas.every() if shared else None),
-        material.filled(stack, read, bool(shown)),
-    )
-    placed = films.layouts(recording.films)
-    name = "A material" if shown else remark(material.title(stack))
-    costs = _costs(recording)
-    parts = [
-        printer.header(name, described(recording.model), not recording.read, costs),
-        printer.structs(material.structs(stack, read)),
+    material, chosen, general = load(stack), named(model, **switches), values == "uniforms"
+    if general and isinstance(material, Mix):
+        raise InvalidInput("uniforms: only of a single stack, not of a mixture")
+    check_constant(material, constant)
+    parts = [PartCode.of(path, leaf, chosen, constant, printer, general, baking) for path, leaf in material.leaves()]
+    mixture = Mixture.of(material, parts, constant) if isinstance(material, Mix) else None
+    own = mixture.own if mixture else parts
+
+    # Put together what their code reads
+    symbols = [symbol for part in own for symbol in part.recording.symbols]
+    looked_up = {symbol.detail for symbol in symbols if symbol.op in ("texels", "value")}
+    layouts = atlas.layouts(looked_up, atlas.every() if shared else None)
+    tables = {name: table for part in own for name, table in sorted(part.films.items())}
+    placed = films.layouts(tables)
+    lines = [0, *accumulate(part.lines for part in own)]
+    read = {name for part in parts for name in part.read}.union(mixture.weights if mixture else ())
+    shown, baked = parts[0].recording.shown, None if mixture else parts[0].recording.baked
+    filled = contents(material, read, bool(shown))
+    costs = mixture.costs if mixture else parts[0].costs
+
+    # Print
+    name = "A material" if shown else remark(title(material))
+    models = " and ".join(dict.fromkeys(described(part.recording.model) for part in parts))
+    texts = [
+        printer.header(name, models, not read, costs),
+        *(part.named(part.values) for part in own),
+        *([printer.structs([mixture.values])] if mixture else []),
         *([printer.parameters(len(shown), *((baked.colours, baked.numbers) if baked else (0, 0)))] if shown else []),
         printer.material(filled),
-        printer.structs(_structs(recording)),
+        *(part.named(part.lobes) for part in own),
+        *([printer.structs([mixture.lobes])] if mixture else []),
         *([printer.tables(layouts)] if layouts else []),
-        *([printer.lookup(baked)] if baked else []),
+        *([printer.baked_texture(max(part.width for part in own), lines[-1])] if lines[-1] else []),
+        *(part.named(part.lookup(first)) for part, first in zip(own, lines) if part.lines),
         *([printer.films(placed)] if placed else []),
-        printer.helpers({(symbol.op, symbol.kind) for symbol in recording.symbols}),
-        printer.lobes({name: (value, recording.kinds[name]) for name, value in recording.lobes.items()}),
-        *([printer.energies([(value, "colour") for value in recording.energies])] if recording.energies else []),
-        printer.eval_pdf((recording.value, "colour"), (recording.density, "number")),
-        printer.sample([(w, "number") for w in recording.drawn]),
+        printer.helpers({(symbol.op, symbol.kind) for symbol in symbols}),
+        *(part.named(part.functions) for part in own),
+        *([printer.mixture(mixture.members)] if mixture else []),
     ]
     return Shader(
-        text=prefixed("\n".join(parts), prefix),
+        text=prefixed("\n".join(texts), prefix),
         looked_up=[layout.name for layout in layouts],
-        uniforms=recording.parameters,
+        uniforms={name: place for part in parts for name, place in part.uniforms.items()}
+        | {name: name for name in (mixture.weights if mixture else ())},
         maps={prefixed(name, prefix): image for name, image in filled.samplers.items()},
-        lobes=_interfaces(recording),
+        lobes=[] if mixture else _interfaces(parts[0].recording),
         shown=shown,
-        shares=recording.shares,
+        shares=[] if mixture else parts[0].recording.shares,
         baked=baked,
+        columns=stacked([part.columns for part in own if part.columns is not None]),
         film_tables=[layout.name for layout in placed],
-        films=films.texture(films.tables(stack, recording.films, recording.model)),
+        films=films.texture(tables),
         costs={prefixed(name, prefix): cost for name, cost in costs.items()},
         shared=shared,
     )
@@ -154,17 +172,6 @@ def prefixed(text: str, prefix: str) -> str:
     words = "".join(word[:1].upper() + word[1:] for word in prefix.split("_"))
     names = {"vt_": f"{prefix}_", "Vt": words, "VT_": f"{prefix.upper()}_"}
     return text if prefix == PREFIX else _NAME.sub(lambda found: names[found[1]], text)
-
-
-def _costs(recording: Recording) -> dict[str, Cost]:
-    """Cost of each function; lobes are read from a texture of one or two axes."""
-    functions = {
-        "vt_lobes": list(recording.lobes.values()),
-        "vt_eval_pdf": [recording.value, recording.density],
-        "vt_sample": recording.drawn,
-    }
-    axes = len(recording.baked.nodes) if recording.baked else 0
-    return {name: cost(outputs, axes) for name, outputs in functions.items()}
 
 
 def _interfaces(recording: Recording) -> list[list[int]]:
@@ -181,19 +188,3 @@ def described(model: Model) -> str:
     changed = [f"{key}={getattr(model, key)}" for key in SWITCHES if getattr(model, key) != getattr(shipped, key)]
     changed += ["in closed form"] if model.closed_form and not shipped.closed_form else []
     return " ".join([model.name, *([f"({', '.join(changed)})"] if changed else [])])
-
-
-def _structs(recording: Recording) -> list[Struct]:
-    """A lobe, all that is known once wi is, and energies of a solved material."""
-    kinds = recording.kinds
-    places = dict.fromkeys(name.rpartition(".")[0] for name in kinds if "." in name)
-    count = sum(place.startswith("reflected") for place in places)
-    parts = {part(name): kind for name, kind in kinds.items() if "." in name}
-    members = [Field("reflected", "VtLobe", count)] if count else []
-    members += [Field("transmitted", "VtLobe")] if "transmitted" in places else []
-    members += [Field(name, kind) for name, kind in kinds.items() if "." not in name]
-    lobe = Struct("VtLobe", [Field(name, kind) for name, kind in parts.items()], "rotation in radians")
-    lobes = Struct("VtLobes", members, "of light from one direction")
-    count = len(recording.energies)
-    energies = Struct("VtEnergies", [Field("parts", "colour", count)], "of interfaces, the remainder, what passes")
-    return [*([lobe] if parts else []), lobes, *([energies] if count else [])]

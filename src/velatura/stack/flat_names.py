@@ -37,8 +37,7 @@ class Address:
     @property
     def name(self) -> str:
         """The flat name."""
-        within = "".join(f"part{number}_" for number in self.parts)
-        return within + (self.key if self.layer is None else f"layer{self.layer}_{self.key}")
+        return prefix(self.parts) + (self.key if self.layer is None else f"layer{self.layer}_{self.key}")
 
     @property
     def film(self) -> int | None:
@@ -65,6 +64,11 @@ class Address:
         if isinstance(value, Varying):
             raise InvalidInput(f"{self.name}: is a {value.what}, and {refusal}")
         return self.declared.reduced(value) if isinstance(value, Measured) else value
+
+
+def prefix(parts: Sequence[int]) -> str:
+    """How the flat names of what a part holds begin, by the numbers of the parts that it is in."""
+    return "".join(f"part{number}_" for number in parts)
 
 
 @functools.lru_cache(256)

@@ -40,7 +40,7 @@ Array = NDArray[np.floating]
 FILM = "film"  # an operation: a table of films, looked up at a cosine, or at coordinates of direction and roughness
 WIDTH = NODES  # texels of a line of the texture; each table begins a line
 SIDES = ("rarer", "denser", "passing")  # what tables of films that absorb are of, as `Absorbing` has them
-_NAME = re.compile(r"film(\d+)(?:_by(\d+))?(?:_(rarer|denser|passing))?(?:_(above|below)(_lost)?)?")
+_NAME = re.compile(r"(?:part\d+_)*film(\d+)(?:_by(\d+))?(?:_(rarer|denser|passing))?(?:_(above|below)(_lost)?)?")
 STEP_NM = 6.0  # between thicknesses that are worked out: 15 nm of optical thickness for an index of 2.5
 
 

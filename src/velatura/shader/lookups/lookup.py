@@ -77,6 +77,13 @@ def texture(columns: Iterable[tuple[int, Array]], groups: Sequence[Group], sides
     return filled.reshape(-1, 4, *filled.shape[1:]).transpose(0, 2, 4, 3, 1).reshape(-1, nodes[0], 4)
 
 
+def stacked(textures: Sequence[Array]) -> Array | None:
+    """Textures in one, each below the one before; None without any."""
+    width = max((texels.shape[1] for texels in textures), default=0)
+    padded = [np.pad(texels, ((0, 0), (0, width - texels.shape[1]), (0, 0))) for texels in textures]
+    return np.concatenate(padded) if padded else None
+
+
 def sides_read(sides: int, model: Model) -> tuple[Value, Value]:
     """The side of the texture that each side reads: where light is, but for the symmetric form, which looks at both."""
     if sides == 1:

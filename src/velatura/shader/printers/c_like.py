@@ -21,7 +21,7 @@ from velatura.shader.lookups.atlas import WIDTH, TableLayout
 from velatura.shader.lookups.films import WIDTH as LINE_OF_FILMS
 from velatura.shader.lookups.lookup import Group, LookUp
 from velatura.shader.material import PARAMETERS, Brushed, Entry, Filled, Mapped
-from velatura.shader.printers.printer import FUNCTIONS, Field, Output, Printer, Struct
+from velatura.shader.printers.printer import FUNCTIONS, Field, Member, Output, Printer, Struct
 from velatura.shader.printers.statements import assignments, statements
 from velatura.shader.recorder.cost import Cost
 from velatura.shader.recorder.symbol import LAYOUT, REMAINDER, SHOWN, Kind, Operand, Symbol
@@ -267,9 +267,12 @@ class CLike(Printer):
         declared = _TABLES.format(self.texels_of, WIDTH) + self.texture("vt_tables", TABLES)
         return f"{declared}\n{self.spelled(_TEXELS + ''.join(map(_table, layouts)))}"
 
-    def lookup(self, bake: LookUp) -> str:
-        comment = _LOBES.format(self.texels_of, bake.nodes[0], bake.height) + self.texture("vt_baked", TABLES)
-        return f"{comment}\n{self.spelled(_BAKED[len(bake.nodes)].format(*bake.nodes, sides=bake.sides))}"
+    def baked_texture(self, width: int, height: int) -> str:
+        return _LOBES.format(self.texels_of, width, height) + self.texture("vt_baked", TABLES)
+
+    def lookup(self, bake: LookUp, first: int) -> str:
+        line = f"y + {first}" if first else "y"
+        return self.spelled(_BAKED[len(bake.nodes)].format(*bake.nodes, sides=bake.sides, line=line))
 
     def films(self, layouts: Sequence[TableLayout]) -> str:
         height = -(-layouts[-1].end // LINE_OF_FILMS)
@@ -307,6 +310,16 @@ class CLike(Printer):
         lines, texts = statements(drawn, self)
         head = "vec3 vt_sample(VtMaterial m, VtLobes l, vec3 wi, vec3 u)"
         return self._function(head, [*lines, f"return {self.colour(texts)};"])
+
+    def mixture(self, members: Sequence[Member]) -> str:
+        shares = assignments({f"l.{name}_share": (share, "number") for name, _, share in members}, self)
+        filled = [f"l.{name} = vt_{own}lobes(m.{name}, wi);" for name, own, _ in members]
+        begin = self.declared("VtLobes", "l")
+        lobes = self._function("VtLobes vt_lobes(VtMaterial m, vec3 wi)", [begin, *shares, *filled, "return l;"])
+        sums = "".join(_SUM_OF_PARTS.format(name, own) for name, own, _ in members)
+        drawn = [_DRAWN_OF_PART.format(name, own) for name, own, _ in members]
+        choices = "".join(_CHOICE_OF_PART.format(name, each) for (name, _, _), each in zip(members, drawn[:-1]))
+        return f"{lobes}\n{self.spelled(_MIXTURE.format(sums=sums, choices=choices, last=drawn[-1]) + _WRAPPERS)}"
 
     def _function(self, head: str, lines: Sequence[str]) -> str:
         opening, *rest = _block(head, lines)
@@ -373,6 +386,22 @@ _WRAPPERS = """\
 vec3 vt_eval(VtMaterial m, VtLobes l, vec3 wi, vec3 wo) { return vt_eval_pdf(m, l, wi, wo).rgb; }
 float vt_pdf(VtMaterial m, VtLobes l, vec3 wi, vec3 wo) { return vt_eval_pdf(m, l, wi, wo).a; }
 """
+
+_MIXTURE = """\
+vec4 vt_eval_pdf(VtMaterial m, VtLobes l, vec3 wi, vec3 wo) {{
+    vec4 f = vec4(0.0, 0.0, 0.0, 0.0);
+{sums}    return f;
+}}
+
+vec3 vt_sample(VtMaterial m, VtLobes l, vec3 wi, vec3 u) {{
+    float x = u.x;
+{choices}    {last}
+}}
+
+"""
+_SUM_OF_PARTS = "    if (l.{0}_share > 0.0) {{ f += l.{0}_share * vt_{1}eval_pdf(m.{0}, l.{0}, wi, wo); }}\n"
+_CHOICE_OF_PART = "    if (x < l.{0}_share) {{ {1} }}\n    x -= l.{0}_share;\n"
+_DRAWN_OF_PART = "return vt_{1}sample(m.{0}, l.{0}, wi, vec3(min(x / max(l.{0}_share, 1e-15), 0.99999994), u.y, u.z));"
 
 _TABLES = """\
 // Averages of Fresnel over rough interfaces: {}, {} texels a row, never filtered.
@@ -442,7 +471,7 @@ _LOBES = """\
 
 _BAKED = {
     1: """\
-vec4 vt_column(int node, int y) {{ return texelFetch(vt_baked, ivec2(node, y), 0); }}
+vec4 vt_column(int node, int y) {{ return texelFetch(vt_baked, ivec2(node, {line}), 0); }}
 
 vec4 vt_baked_texel(int texel, vec3 place) {{
     float position = clamp(place.x, 0.0, 1.0) * float({0} - 1);
@@ -452,7 +481,7 @@ vec4 vt_baked_texel(int texel, vec3 place) {{
 }}
 """,
     2: """\
-vec4 vt_column(int node, int y) {{ return texelFetch(vt_baked, ivec2(node, y), 0); }}
+vec4 vt_column(int node, int y) {{ return texelFetch(vt_baked, ivec2(node, {line}), 0); }}
 
 vec4 vt_baked_texel(int texel, vec3 place) {{
     vec2 position = clamp(place.xy, vec2(0.0, 0.0), vec2(1.0, 1.0)) * vec2({0} - 1, {1} - 1);

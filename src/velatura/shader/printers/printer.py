@@ -61,6 +61,14 @@ class Struct(NamedTuple):
     comment: str
 
 
+class Member(NamedTuple):
+    """A stack of a mixture: its member in structs, the prefix of the names of its functions, and its share."""
+
+    name: str
+    functions: str
+    share: Operand
+
+
 class Language(ABC):
     """A shader language: the spelling of values and statements.
 
@@ -209,8 +217,12 @@ class Printer(Language):
         """The texture of tables, and functions that look up each of them in it."""
 
     @abstractmethod
-    def lookup(self, bake: LookUp) -> str:
-        """The texture of lobes over direction, and functions that look up each group of its texels."""
+    def baked_texture(self, width: int, height: int) -> str:
+        """The texture of lobes over direction."""
+
+    @abstractmethod
+    def lookup(self, bake: LookUp, first: int) -> str:
+        """Functions that look up each group of texels of lobes, from a line of their texture on."""
 
     @abstractmethod
     def films(self, layouts: Sequence[TableLayout]) -> str:
@@ -235,3 +247,8 @@ class Printer(Language):
     @abstractmethod
     def sample(self, drawn: Sequence[Output]) -> str:
         """`vt_sample(m, l, wi, u)`, of the three coordinates of a direction."""
+
+    @abstractmethod
+    def mixture(self, members: Sequence[Member]) -> str:
+        """The same functions of stacks side by side, by those of each: `vt_lobes` with all shares, `vt_eval_pdf` as
+        their weighted sum, and `vt_sample` of a part that the first random number chooses, which is then rescaled."""

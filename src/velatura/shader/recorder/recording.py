@@ -25,7 +25,7 @@ from velatura.shader.recorder.graph import Graph, known_before
 from velatura.shader.recorder.seen import Seen, of_lobes
 from velatura.shader.recorder.symbol import Kind, Operand, Symbol, in_order
 from velatura.shader.recorder.tape import Tape
-from velatura.stack import Address, Material, Stack, Varying, as_described
+from velatura.stack import Address, Described, Material, Stack, Varying, as_described
 from velatura.stack.schema import unknown
 
 LATER = ("wo.", "u.")  # inputs that are known after wi
@@ -159,13 +159,13 @@ def drawn_by(stack: Stack, model: Model) -> Model:
     return model if is_uniform(stack) and stack.interfaces else model.surrogate
 
 
-def is_uniform(stack: Stack) -> bool:
+def is_uniform(stack: Described) -> bool:
     """Whether no value differs from point to point."""
     return not any(isinstance(value, Varying) for value in stack.flat().values())
 
 
-def check_constant(stack: Stack, constant: Collection[str]) -> None:
-    """Refuse names of constants that the stack does not have."""
+def check_constant(stack: Described, constant: Collection[str]) -> None:
+    """Refuse names of constants that the material does not have."""
     flat = stack.flat()
     for name in constant:
         if name not in flat:

@@ -1,0 +1,82 @@
+"""A mixture as a program: the structs that hold those of its parts, and the share of each."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Iterator, Sequence
+from dataclasses import dataclass
+
+from velatura import ops
+from velatura.shader import material
+from velatura.shader.part import PartCode
+from velatura.shader.printers.printer import Field, Member, Struct
+from velatura.shader.recorder.cost import Cost, cost
+from velatura.shader.recorder.graph import Graph
+from velatura.shader.recorder.symbol import Operand, number
+from velatura.stack import Address, Mix
+from velatura.stack import number as plain
+from velatura.stack.mix import WEIGHT
+
+
+@dataclass(frozen=True)
+class Mixture:
+    """The stacks of a mixture, with their shares; `own` are the first of each pattern, whose functions those of the
+    same pattern use, and `weights` the flat names of the weights that the code reads."""
+
+    parts: Sequence[PartCode]
+    own: Sequence[PartCode]
+    members: Sequence[Member]
+    weights: Sequence[str]
+
+    @classmethod
+    def of(cls, mix: Mix, parts: Sequence[PartCode], constant: Collection[str]) -> Mixture:
+        first: dict[object, PartCode] = {}
+        used = [first.setdefault(part.pattern, part) for part in parts]
+        each = zip(parts, used, shares(mix, constant))
+        members = [Member(part.member, other.prefix, share) for part, other, share in each]
+        return cls(parts, list(first.values()), members, [at.name for at in _weights(mix) if at.name not in constant])
+
+    @property
+    def values(self) -> Struct:
+        """The struct of all values, those of parts within; numbers come first, as in the struct of a layer's part."""
+        own = [Field(name, "number") for name in self.weights]
+        return Struct("VtMaterial", [*own, *self._each("VtMaterial")], "weights, and the values of each part")
+
+    @property
+    def lobes(self) -> Struct:
+        """The struct of the shares and lobes of all parts."""
+        shares = [Field(f"{member.name}_share", "number") for member in self.members]
+        return Struct("VtLobes", [*shares, *self._each("VtLobes")], "of light from one direction, with shares of parts")
+
+    def _each(self, struct: str) -> Iterator[Field]:
+        for member in self.members:
+            (own,) = (part for part in self.own if part.prefix == member.functions)
+            yield Field(member.name, own.named(struct))
+
+    @property
+    def costs(self) -> dict[str, Cost]:
+        """The cost of each function, where every part has a share; a sample is that of the dearest."""
+        each = [part.costs for part in self.parts]
+        shared = cost([member.share for member in self.members], 0)
+        added = {name: [costs[name] for costs in each] for name in each[0]}
+        dearest = max(added.pop("vt_sample"), key=lambda own: (own.operations, own.texels))
+        added["vt_lobes"].append(shared)
+        summed = {
+            name: Cost(sum(own.operations for own in costs), sum(own.texels for own in costs))
+            for name, costs in added.items()
+        }
+        return {**summed, "vt_sample": dearest}
+
+
+def shares(mix: Mix, constant: Collection[str]) -> list[Operand]:
+    """The share of every stack, recorded from the weights that are not constant."""
+
+    def weight(at: Address, value: object) -> object:
+        return plain(at, value) if at.name in constant else number(f"m.{material.place(at)}")
+
+    with ops.readable():
+        found = mix.shares({at.name: weight(at, value) for at, value in mix.values() if at.declared is WEIGHT})
+    return Graph().unique(found)
+
+
+def _weights(mix: Mix) -> Iterator[Address]:
+    return (at for at, _ in mix.values() if at.declared is WEIGHT)
