@@ -1,6 +1,6 @@
-"""Phase functions of media in the editor, in headless Chromium.
+"""Phase functions and pigments of media in the editor, in headless Chromium.
 
-Rationale: Python alone knows what follows from a phase function, so that pictures of all models must ask it.
+Rationale: Python alone knows what follows from them, so that pictures of all models must ask it.
 """
 
 from __future__ import annotations
@@ -45,4 +45,30 @@ def test_a_medium_is_given_another_phase_function(model: str, opened: Callable[.
     assert visit.state("layers.1.keys.phase") == {"forward": 0.8, "backward": -0.3, "share": 0.1}
     menu.select_option("g")
     assert "phase" not in visit.state("layers.1.keys")
+    assert unexpected(tabs.forget(), []) == []
+
+
+PAINTED = """
+layers:
+  - interface: {eta: 1.5, alpha: 0.1}
+  - medium: {depth: 1, pigments: [{name: "white <b>", K: 0.01, S: 4}, {K: [3, 0.8, 0.1], S: 0.4}]}
+  - diffuse: {albedo: 0.5}
+"""
+
+
+def test_pigments_stand_in_place_of_what_follows_from_them(opened: Callable[..., Any], served: Server) -> None:
+    """Expected: their names, no fields of coefficients, a picture that follows their medium, and the same file."""
+    tabs = Tabs(opened)
+    visit = tabs.visit(served.entrance)
+    (served.folder / "painted.yaml").write_text(PAINTED, encoding="utf-8")
+    visit.page.evaluate("velatura.openFile('painted.yaml')")
+    visit.page.wait_for_function("() => velatura.store.get().layers.some(({ keys }) => keys.pigments)")
+    before = visit.picture()
+    visit.page.get_by_text("white <b>, pigment 1").wait_for()
+    assert visit.page.get_by_label("Absorption").count() == 0
+    field = visit.page.get_by_label("Depth", exact=True).last
+    field.fill("0.01")
+    field.press("Enter")
+    assert difference(visit.picture(), before) > OTHER
+    assert len(visit.state("layers.1.keys.pigments")) == 2
     assert unexpected(tabs.forget(), []) == []

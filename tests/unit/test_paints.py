@@ -12,6 +12,7 @@ import velatura as vt
 from velatura import inverse, reference
 from velatura.errors import InvalidInput
 from velatura.inverse import paints
+from velatura.inverse.fitting import simplify
 from velatura.stack import load
 
 NM = np.arange(400, 701, 20.0)
@@ -190,3 +191,11 @@ def test_what_is_no_wish_is_refused(stack: vt.Stack, wish: Any, options: dict[st
     with pytest.raises(InvalidInput) as caught:
         inverse.paint(stack, wish, **options)
     assert message in str(caught.value)
+
+
+def test_a_simpler_stack_has_the_colours_of_pigments() -> None:
+    """A spectrum that is flat is a number; depths add up."""
+    media = [vt.Medium(depth=0.5, pigments=[{"K": spectral(2), "S": 3}]), vt.Medium(sigma_a=(1, 2, 3))]
+    merged = simplify._merged(media)
+    assert merged.sigma_a == pytest.approx((1.5, 2.5, 3.5))
+    assert merged.sigma_s == pytest.approx(2.0)

@@ -121,6 +121,24 @@ def test_values_take_the_place_of_pigments_and_the_other_way_round() -> None:
     assert sigma(found.replace(layer1_g=0.5))[1] == pytest.approx(2 * np.array(sigma(found)[1]))
 
 
+def test_a_concentration_is_set_by_its_flat_name() -> None:
+    found = paint([WHITE, BLUE])
+    changed = found.replace(layer1_pigment1_concentration=0.5, layer1_pigment0_concentration=2)
+    assert sigma(changed) == sigma(paint([{**WHITE, "concentration": 2.0}, {**BLUE, "concentration": 0.5}]))
+    for name, message in {
+        "layer1_pigment2_concentration": "layer 1 (medium): pigment2_concentration: the last pigment is pigment 1",
+        "layer1_pigment0_K": "layer1_pigment0_K: layer 1 (medium) has no pigment0_K",
+        "layer0_pigment0_concentration": "layer0_pigment0_concentration: layer 0 (dielectric) has no",
+    }.items():
+        with pytest.raises(InvalidInput) as caught:
+            found.replace(**{name: 0.1})
+        assert message in str(caught.value)
+    with pytest.raises(InvalidInput, match="there are no pigments"):
+        vt.Stack([vt.Medium(), vt.Diffuse()]).replace(layer0_pigment0_concentration=0.1)
+    with pytest.raises(InvalidInput, match="pigments: pigment 1: concentration: must lie in 0 to 1e9, got -1"):
+        found.replace(layer1_pigment1_concentration=-1)
+
+
 def test_lossless_pigments_are_known() -> None:
     assert vt.Medium(pigments=[{"K": 0, "S": 1}]).lossless
     assert not vt.Medium(pigments=[WHITE]).lossless

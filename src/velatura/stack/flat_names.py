@@ -21,6 +21,7 @@ from velatura.stack.values import RGB, Colour, Film, Scalar, Substance, Varying
 _OPTIONS = ("name", "source", "exterior", "thin")
 _LAYER = re.compile(r"layer(\d{1,9})_(\w+)")
 _FILM = re.compile(r"film(\d)_(\w+)")
+_PIGMENT = re.compile(r"pigment(\d{1,2})_concentration")
 _OF_FILMS = {key: declared for key, declared in parameters(Film).items() if isinstance(declared, Scalar)}
 
 
@@ -135,7 +136,8 @@ def changed(mapping: Mapping[str, Any], kinds: Sequence[str], values: Mapping[st
             raise InvalidInput(f"layer{index}_{next(iter(fields))}: the last layer is layer {len(entries) - 1}")
         keys = _keys(kinds[index])
         for key in fields:
-            if key not in keys and not ("films" in keys and _FILM.fullmatch(key)):
+            part = ("films" in keys and _FILM.fullmatch(key)) or ("pigments" in keys and _PIGMENT.fullmatch(key))
+            if key not in keys and not part:
                 where = f"layer{index}_{key}: layer {index} ({kinds[index]})"
                 raise InvalidInput(f"{where} has no {key}, only {', '.join(keys)}")
         # Write it in
@@ -181,7 +183,10 @@ def _inferred_kind(fields: Mapping[str, Any]) -> str:
 
 def _merged(old: Mapping[str, Any], new: Mapping[str, Any]) -> dict[str, Any]:
     """The keys of one layer with some of them changed."""
-    fields = {**old, **{key: value for key, value in new.items() if not _FILM.fullmatch(key)}}
+    fields = {
+        **old,
+        **{key: value for key, value in new.items() if not (_FILM.fullmatch(key) or _PIGMENT.fullmatch(key))},
+    }
 
     # Let a value of a film replace that one, or begin the next film
     films = [dict(film) if isinstance(film, Mapping) else film.to_dict() for film in fields.get("films", ())]
@@ -214,6 +219,19 @@ def _merged(old: Mapping[str, Any], new: Mapping[str, Any]) -> dict[str, Any]:
     for one, other in (("phase", "g"), ("g", "phase")):
         if one in new and other not in new:
             fields.pop(other, None)
+
+    # Let a concentration replace that of its pigment
+    pigments = list(fields.get("pigments", ()))
+    for key, value in new.items():
+        if parts := _PIGMENT.fullmatch(key):
+            number = int(parts[1])
+            if number >= len(pigments):
+                has = f"the last pigment is pigment {len(pigments) - 1}" if pigments else "there are no pigments"
+                raise InvalidInput(f"{key}: {has}")
+            old_one = pigments[number]
+            as_written = old_one if isinstance(old_one, Mapping) else old_one.to_dict()
+            pigments[number] = {**as_written, "concentration": value}
+    fields = {**fields, "pigments": pigments} if pigments else fields
 
     # Let pigments replace what follows from them, and a part of that the pigments
     if "pigments" in new:

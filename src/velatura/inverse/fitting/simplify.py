@@ -8,6 +8,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from itertools import combinations
 from math import comb
+from typing import Any
 
 import numpy as np
 
@@ -29,11 +30,14 @@ from velatura.stack import (
     Layer,
     Material,
     MaterialLike,
+    Measured,
     Medium,
     Stack,
     as_described,
     single,
 )
+from velatura.stack.schema import parameters
+from velatura.stack.values import Colour
 
 STARTS = 4
 BRUSHED, BRUSHING = (22.5, 67.5, 112.5, 157.5), 1.5  # degrees, and by which ratios, fits of brushed samples start
@@ -213,7 +217,7 @@ def _merged(media: Sequence[Medium]) -> Medium:
     """One medium of depth 1 with the optical depths of several, clear where there is none, and their phase function,
     or else Henyey and Greenstein's of their mean asymmetry."""
     absorbed, scattered = (
-        np.array([np.broadcast_to(medium.written(key), 3) * medium.depth for medium in media]).reshape(-1, 3)
+        np.array([np.broadcast_to(_colour(medium, key), 3) * medium.depth for medium in media]).reshape(-1, 3)
         for key in ("sigma_a", "sigma_s")
     )
     often = scattered.mean(axis=1)
@@ -223,6 +227,14 @@ def _merged(media: Sequence[Medium]) -> Medium:
         return Medium(sigma_a=sigma_a, sigma_s=sigma_s, phase=phase)
     g = np.average([medium.written("g") for medium in media], weights=often) if often.sum() > 0 else 0.0
     return Medium(sigma_a=sigma_a, sigma_s=sigma_s, g=float(g))
+
+
+def _colour(medium: Medium, key: str) -> Any:
+    """A coefficient of a medium as a number or a colour."""
+    value = medium.written(key)
+    declared = parameters(Medium)[key]
+    assert isinstance(declared, Colour)
+    return declared.reduced(value) if isinstance(value, Measured) else value
 
 
 def _with_media(stack: Stack) -> Stack:
