@@ -13,7 +13,7 @@ from velatura import inverse, reference
 from velatura.errors import InvalidInput
 from velatura.inverse import paints
 from velatura.inverse.fitting import simplify
-from velatura.stack import load
+from velatura.stack import Named, load, spectrum
 
 NM = np.arange(400, 701, 20.0)
 K = 0.05 + 4 * np.exp(-(((NM - 600) / 60) ** 2))
@@ -153,7 +153,7 @@ def seen(stack: vt.Stack) -> np.ndarray:
     nm, weights = paints.observer()
     if not hasattr(stack.flat()["layer1_sigma_a"], "table"):
         return np.asarray(vt.lobes(stack, COS_8).remainder[:, 0])
-    material = paints.replace(paints.Material.of(stack, paints.at_wavelengths(nm)), light=nm)
+    material = paints.at_wavelengths(stack, nm)
     return np.asarray(weights @ paints.reflectance(material, specular=False))
 
 
@@ -161,7 +161,7 @@ def test_a_wished_spectrum_is_reached() -> None:
     shares = np.array([0.3, 0.2, 0.1])
     nm, _ = paints.observer()
     mixed = paint(SPECTRAL, shares)
-    material = paints.replace(paints.Material.of(mixed, paints.at_wavelengths(nm)), light=nm)
+    material = paints.at_wavelengths(mixed, nm)
     wish = vt.Spectrum(spectrum=np.stack([nm, paints.reflectance(material)], axis=1))
     found = inverse.paint(paint(SPECTRAL), wish, specular=True)
     np.testing.assert_allclose(found.concentrations, shares, rtol=0.02)
@@ -199,3 +199,25 @@ def test_a_simpler_stack_has_the_colours_of_pigments() -> None:
     merged = simplify._merged(media)
     assert merged.sigma_a == pytest.approx((1.5, 2.5, 3.5))
     assert merged.sigma_s == pytest.approx(2.0)
+
+
+def test_a_colour_is_that_of_all_wavelengths_by_themselves() -> None:
+    """A spectral paint over a named metal, under a film, against stacks of numbers.
+
+    (Under a named varnish all wavelengths are refracted by its mean index, and differ by up to .004 below a film.)
+    """
+    nm, weights = paints.observer()
+
+    def stack(pigment: dict[str, Any], **metal: Any) -> vt.Stack:
+        coat = vt.Interface(eta=1.5, alpha=0.1, films=[vt.Film(eta=1.8, thickness_nm=200)])
+        return vt.Stack([coat, vt.Medium(depth=0.02, pigments=[pigment]), vt.Interface(**metal, alpha=0.2)])
+
+    painted = stack(SPECTRAL[1], conductor="Au")
+    material = paints.at_wavelengths(painted, nm)
+    assert paints.paint_colour(painted) == pytest.approx(weights @ paints.reflectance(material, specular=False))
+    eta, k = (np.interp(nm, *spectrum(Named("Au", part))) for part in ("eta", "k"))
+    absorbed, together = np.interp(nm, NM, 60 * bump(620, 80)), paints.reflectance(material)
+    for n in (0, 12, 24, 35):
+        alone = stack({"K": float(absorbed[n]), "S": 3}, eta=float(eta[n]), k=float(k[n]))
+        (one,) = paints.reflectance(paints.at_wavelengths(alone, nm[n : n + 1]))
+        assert together[n] == pytest.approx(one, abs=3e-4)

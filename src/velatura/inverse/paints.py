@@ -6,7 +6,7 @@ Reflectances are those of an instrument with an integrating sphere, which sees t
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -48,16 +48,22 @@ HIDDEN = 3.0  # depth of a film of which nothing shows through, in lengths of di
 RANGE = 1e-5, 1e5  # of K and S times the depth of a film
 STEP = 1e-3  # of logarithms, for derivatives
 MEASURED = "wavelength_nm", "black", "white"  # columns of a file
+VISIBLE_NM = 380.0, 730.0  # of which colours are made
+PULL = 1e-3  # towards the first guess, in units of colour difference: decides what the wish leaves open
+SAME = 1e-6  # half the square of a colour difference that is none
+FIRM = 1e4  # on the sum of concentrations
+SPECTRAL = 100.0  # of reflectances over wavelength, so that 1 is about one unit of colour difference
 NONE = np.zeros(0)  # directions at which the remainder, which has no lobe, is known
 
 
 # What an instrument sees ---------------------------------------------------------------------------------------------
 
 
-def at_wavelengths(nm: Array) -> Callable[[Address, Any], Any]:
-    """The values of a material at wavelengths (N,), for `Material.of`: numbers, and colours of shape (N, 1) or (1, 1).
+def at_wavelengths(stack: Stack, nm: Array) -> Material:
+    """The values of a stack at wavelengths (N,): numbers, and colours of shape (N, 1), or (1, 1) where all are alike.
 
-    They raise `InvalidInput` for a texture, and for [r, g, b], which has no wavelengths.
+    Raises:
+        InvalidInput: a texture, or [r, g, b], which has no wavelengths.
     """
 
     def value(address: Address, described: Any) -> Any:
@@ -68,7 +74,9 @@ def at_wavelengths(nm: Array) -> Callable[[Address, Any], Any]:
             raise InvalidInput(f"{address.name}: is [r, g, b], and others are spectra; write a number or a spectrum")
         return np.full((1, 1), plain) if address.colour else float(plain)
 
-    return value
+    # Channels are wavelengths, and no colours of what was measured
+    made = Material.of(stack, value).of_metals([None] * len(stack.layers))
+    return replace(made, light=nm)
 
 
 def reflectance(material: Material, specular: bool = True) -> Array:
@@ -95,7 +103,7 @@ def paint_colour(material: MaterialLike, specular: bool = False) -> Array:
     if not any(isinstance(value, Measured) for value in stack.flat().values()):
         return np.broadcast_to(reflectance(Material.of(stack), specular), 3).copy()
     nm, weights = observer()
-    found = reflectance(replace(Material.of(stack, at_wavelengths(nm)), light=nm), specular)
+    found = reflectance(at_wavelengths(stack, nm), specular)
     return np.asarray(weights @ np.broadcast_to(found, len(nm)))
 
 
@@ -196,7 +204,7 @@ def fit_pigment(
     described = Stack([interface or Interface(eta=1.5), Medium(depth=depth, g=g), Diffuse()])
     if described.transmits or not depth > 0:
         raise InvalidInput(f"depth: must be above 0, got {show(depth)}")
-    material = replace(Material.of(described, at_wavelengths(nm)), light=nm)
+    material = at_wavelengths(described, nm)
 
     def read_off(logarithms: Array) -> Array:
         """Reflectances over both grounds, (2, N), of the logarithms of K and S, (2, N)."""
@@ -409,13 +417,6 @@ def paint(
     )
 
 
-VISIBLE_NM = 380.0, 730.0  # of which colours are made
-PULL = 1e-3  # towards the first guess, in units of colour difference: decides what the wish leaves open
-SAME = 1e-6  # half the square of a colour difference that is none
-FIRM = 1e4  # on the sum of concentrations
-SPECTRAL = 100.0  # of reflectances over wavelength, so that 1 is about one unit of colour difference
-
-
 @dataclass(frozen=True)
 class _Seen:
     """A material and its pigments in channels, those of sRGB or at wavelengths `nm`, and the wish.
@@ -453,7 +454,7 @@ class _Seen:
             return np.broadcast_to(np.asarray(value, float), weights.shape[1:])
 
         k, s = (np.array([channels(each.coefficients[part]) for each in pigments]) for part in (0, 1))
-        material = Material.of(stack) if nm is None else replace(Material.of(stack, at_wavelengths(nm)), light=nm)
+        material = Material.of(stack) if nm is None else at_wavelengths(stack, nm)
         return cls(material, k, s, nm, weights, wished, is_table)
 
     def rgb(self, reflected: Array) -> Array:
