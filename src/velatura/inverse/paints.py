@@ -16,8 +16,6 @@ from numpy.typing import ArrayLike, NDArray
 
 from velatura import files, tables
 from velatura.errors import InvalidInput, one_line, within
-from velatura.model.solved.energies.energies import energies
-from velatura.model.solved.lobes import widths
 from velatura.optics import kubelka_munk
 from velatura.stack import (
     Address,
@@ -82,8 +80,11 @@ def at_wavelengths(stack: Stack, nm: Array) -> Material:
 def reflectance(material: Material, specular: bool = True) -> Array:
     """Reflectance (C,) of a material of NumPy's values, by its channels; without `specular`, less what the first
     interface reflects."""
+    from velatura.model.solved.energies.energies import energies
+    from velatura.model.solved.lobes.widths import nearly_straight
+
     cosines = np.array([np.cos(np.radians(TILT))])
-    found = energies(material, cosines, 0 * cosines, tables.load(), widths.nearly_straight, incidences=NONE)
+    found = energies(material, cosines, 0 * cosines, tables.load(), nearly_straight, incidences=NONE)
     total = found.lobes.sum(axis=0) + found.veils.sum(axis=0) + found.rest
     if not specular and isinstance(material.layers[0], InterfaceValues):
         total = total - found.lobes[0]
