@@ -151,9 +151,10 @@ def mixed_case(patterns: Sequence[Pattern], count: int, rng: np.random.Generator
     weights = {name: rng.uniform(0.1, 0.7, count).astype(np.float32).astype(float) for name in WEIGHTS}
     first, second = (float(weights[name][0]) for name in WEIGHTS)
     mix = Mix([(first, a), (None, Mix([(second, b), (None, c)]))])
-    parts = [(prefix, replace(case, directions=cases[0].directions)) for prefix, case in zip(PARTS, cases)]
+    directions = max((case.directions for case in cases), key=lambda each: (each["wi"][2] < 0).any())
+    parts = [(prefix, replace(case, directions=directions)) for prefix, case in zip(PARTS, cases)]
     values = {prefix + name: x for prefix, case in parts for name, x in case.values.items()}
-    return MixedCase(Case(mix, {**weights, **values}, cases[0].directions), parts)
+    return MixedCase(Case(mix, {**weights, **values}, directions), parts)
 
 
 WEIGHTS, PARTS = ("part0_weight", "part1_part0_weight"), ("part0_", "part1_part0_", "part1_part1_")

@@ -191,7 +191,7 @@ mix:
 """
 
 
-@pytest.mark.parametrize("to", ["json", "python", "mitsuba-xml", "glsl", "wgsl"])
+@pytest.mark.parametrize("to", ["json", "python", "mitsuba-xml", "glsl", "wgsl", "osl", "blender"])
 def test_mixtures_are_exported(to: str, run: Run, tmp_path: Path) -> None:
     """Expected: files of a description read back as the mixture, its mask included; a shader has its weights."""
     (tmp_path / "mask.png").touch()
@@ -208,6 +208,8 @@ def test_mixtures_are_exported(to: str, run: Run, tmp_path: Path) -> None:
     elif to == "mitsuba-xml":
         (material,) = (each for each in ElementTree.fromstring(text).iter("string") if each.get("name") == "material")
         assert vt.stack.loads(material.get("value", ""), "worn.json", tmp_path) == mix
+    elif to in ("osl", "blender"):
+        assert "part0_weight_map" in text and "mask.png" in text and "part1_part0_columns" in text
     else:
         made = shader(mix, printer=LANGUAGES[to]())
         assert text == headed(made.text) and made.columns is not None
@@ -216,11 +218,14 @@ def test_mixtures_are_exported(to: str, run: Run, tmp_path: Path) -> None:
         assert list(made.maps) == ["vt_map_part0_weight"]
 
 
-@pytest.mark.parametrize("preset", PRESETS)
-def test_a_scene_of_mitsuba_can_include_it(preset: str, run: Run, tmp_path: Path) -> None:
+@pytest.mark.parametrize("material", [*PRESETS, "mixture"])
+def test_a_scene_of_mitsuba_can_include_it(material: str, run: Run, tmp_path: Path) -> None:
     """Expected: the BSDF of the XML answers as the one that Python makes, switches included."""
-    run("export", preset, "--to", "mitsuba-xml", "--set", "form=symmetric", "-o", str(tmp_path / "material.xml"))
-    expected = vt.bsdf(vt.preset(preset), form="symmetric")
+    if material == "mixture":
+        vt.save(vt.Mix([(0.3, "bare-gold"), (None, "varnished-paint")]), tmp_path / "mix.yaml")
+        material = str(tmp_path / "mix.yaml")
+    run("export", material, "--to", "mitsuba-xml", "--set", "form=symmetric", "-o", str(tmp_path / "material.xml"))
+    expected = vt.bsdf(material, form="symmetric")
     mi: Any = kernel.mitsuba()
     scene = mi.load_string(
         f"""<scene version="3.0.0"><include filename="{tmp_path / "material.xml"}"/>

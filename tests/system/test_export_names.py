@@ -22,6 +22,7 @@ import pytest
 from machines import MACHINES
 
 import velatura as vt
+from velatura.bakes import TARGETS
 from velatura.exports import FORMATS, baked
 
 HARMLESS = "Plain paint"
@@ -163,6 +164,23 @@ def test_paths_of_textures_do_not_change_the_structure_of_files(to: str, maps: l
             found, end = json.loads(text), f"/{path.parent.name}/{path.name}"
             assert any(each.endswith(end) for each in texts(found))
             assert to != "gltf" or unquote(found["images"][0]["uri"]).endswith(end)
+
+
+@pytest.mark.parametrize("to", [to for to in FORMATS if to not in TARGETS])
+def test_mixtures_keep_their_structure(to: str, maps: list[Path]) -> None:
+    """Expected: the same of the names of a mixture and of a part, and of the path of a mask."""
+
+    def worn(name: str, mask: Path) -> str:
+        weight = {"texture": str(mask), "channel": "g"}
+        return vt.export(vt.Mix([(weight, painted(name)), (None, painted())], name=name), to, MODEL).text
+
+    read = structure(to)
+    expected = read(worn(HARMLESS, maps[0]))
+    for name, path in list(zip(HOSTILE, maps[1:]))[::2]:
+        text = worn(name, path)
+        assert read(text) == expected, name
+        if read is of_json:
+            assert name in texts(json.loads(text))
 
 
 @pytest.mark.parametrize("to", MACHINES)

@@ -78,7 +78,7 @@ def test_polynomials_are_the_columns_that_they_stand_for(preset: str, off: float
 def test_polynomials_of_models_in_closed_form_have_their_light(model: str) -> None:
     """Expected: as the closures in closed form, within .01 of the light: facets of both lose what they block."""
     material, chosen = Material.of(vt.preset("coated-gold")), named(model)
-    for loss in losses(material, chosen, PolynomialFit(tabulated(material, chosen)).above):
+    for loss in losses([(1.0, material)], chosen, PolynomialFit(tabulated(material, chosen)).above):
         assert loss.variation < 0.01
         assert loss.albedo < 0.002
 
@@ -94,3 +94,34 @@ def test_what_a_graph_cannot_hold_is_refused_in_a_line(image: str) -> None:
         vt.export(vt.preset("coated-gold").replace(**curved), "mtlx", "weier2020")
     with pytest.raises(vt.InvalidInput, match=r"mtlx: the index below over that above must be 1, or 1\.223 at least"):
         vt.export(vt.Stack([vt.Interface(eta=1.1, alpha=0.2)]), "mtlx", "weier2020")
+
+
+PAINT = vt.Stack([vt.Interface(eta=1.5, alpha=0.2), vt.Interface(conductor="Al", alpha=0.3)])
+
+
+def test_a_mixture_mixes_its_stacks_by_their_shares(image: str) -> None:
+    """Expected: a chain of `mix`, in which each stack has its share; all generators make code of it."""
+    mix = vt.Mix([(0.3, "frosted-metal"), (0.5, vt.Mix([(0.25, PAINT), (None, PAINT)])), (None, "tinted-plate")])
+    made = document(vt.export(mix, "mtlx", "weier2020").text)
+    node, rest, found = made.getNode("material_surface").getConnectedNode("bsdf"), 1.0, []
+    while node.getCategory() == "mix":
+        weight = node.getInputValue("mix")
+        found.append((node.getConnectedNode("fg").getName(), rest * weight))
+        node, rest = node.getConnectedNode("bg"), rest * (1 - weight)
+    found.append((node.getName(), rest))
+    names = ["part0", "part1_part0", "part1_part1", "part2"]
+    assert [name for name, _ in found] == [f"material_{name}_lobes" for name in names]
+    assert [share for _, share in found] == pytest.approx([share for share, _ in mix.weighted("")], abs=1e-6)
+    for target in GENERATORS:
+        assert "velatura_lobes_material_part1_part1" in generated(made, target), target
+
+    # A mask
+    masked = vt.Mix([({"texture": image, "channel": "g"}, "frosted-metal"), (None, PAINT)])
+    made = document(vt.export(masked, "mtlx", "weier2020").text)
+    (weight,) = (node.getConnectedNode("mix") for node in made.getNodes("mix"))
+    assert weight.getCategory() == "min" and len(made.getNodes("image")) == 1  # kept within 0 and 1
+    for target in GENERATORS:
+        assert generated(made, target), target
+    curved = vt.Mix([({"texture": image, "curve": [0, 0.5, 0.6]}, "frosted-metal"), (None, PAINT)])
+    with pytest.raises(vt.InvalidInput, match="mtlx: part0_weight: textures with a curve"):
+        vt.export(curved, "mtlx", "weier2020")

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from agreement import PATTERNS, coated, random_case
+from agreement import PATTERNS, coated, mixed_case, random_case
 from evaluation import evaluate
 
 import velatura as vt
@@ -19,7 +19,8 @@ from velatura.model.papers import bsdf
 from velatura.shader import closures, variance
 from velatura.shader.closures import Closure
 from velatura.shader.lookups import films
-from velatura.shader.printers.osl import osl
+from velatura.shader.mixture import shares
+from velatura.shader.printers.osl import _Part, osl
 from velatura.shader.recorder import recording
 from velatura.shader.recorder.symbol import in_order
 from velatura.stack import Material
@@ -112,7 +113,7 @@ def test_losses_are_small_where_the_model_is_a_sum_of_lobes_and_grow_with_what_i
     def rougher(w):
         return [c._replace(roughness=c.roughness.scaled(1.1)) for c in known(w)]
 
-    for right, wrong in zip(closures.losses(material, model, known), closures.losses(material, model, rougher)):
+    for right, wrong in zip(*(closures.losses([(1.0, material)], model, each) for each in (known, rougher))):
         assert right.variation < 0.03 and right.albedo < 0.006
         assert wrong.variation > 0.04
 
@@ -174,3 +175,53 @@ def test_a_pane_of_measured_glass_is_a_closure_that_goes_straight_on() -> None:
     """Its index is one of three channels, and in closed form the same on both sides."""
     made = osl("frosted-glass", "weier2020").text
     assert "BSDF += (" in made and 'microfacet("ggx", view, x, ' in made
+
+
+def test_closures_of_a_mixture_are_those_of_its_stacks_by_their_shares() -> None:
+    """Random mixtures in double precision: recorded weights, roughnesses and indices against those of each stack in
+    NumPy, with names of the mixture for all inputs."""
+    case = mixed_case([PATTERNS[k] for k in (9, 15, 18)], 12, np.random.default_rng(3))
+    model, wi = named("weier2020"), recording.direction("wi")
+    mix, values = case.whole.stack, case.whole.values
+    parts = [_Part.of(path, stack, model, (), wi) for path, stack in mix.leaves()]
+    found = closures.weighted(shares(mix, ()), [part.found for part in parts])
+    inputs = {f"m.{recording.material.place(at)}": values[at.name] for at, _ in mix.values() if at.name in values}
+    inputs |= {f"wi.{axis}": x for axis, x in zip("xyz", case.whole.directions["wi"])}
+    truth: list[Closure] = []
+    for share, (_, own) in zip(mix.shares(values), case.parts):
+        material = Material.from_flat(own.stack, {**Material.of(own.stack).flat(), **own.values})
+        body = bsdf.body(material, model, variance(own.stack), at_a_point())
+        truth += closures.weighted([share], [closures.of_body(body, tuple(own.directions["wi"]), straight=False)])
+    assert [closure.kind for closure in found] == [closure.kind for closure in truth]
+    for a, b in zip(evaluate(_numbers(found), inputs), _numbers(truth)):
+        np.testing.assert_allclose(np.broadcast_to(a, (3, 12)), np.broadcast_to(b, (3, 12)), rtol=1e-6, atol=1e-12)
+
+
+def test_a_mixture_is_one_shader(tmp_path: Path) -> None:
+    """Expected: parameters by flat name, a weight from its texture, columns of each solved stack."""
+    (tmp_path / "worn.png").touch()
+    mask = {"texture": str(tmp_path / "worn.png"), "channel": "g"}
+    mix = vt.Mix([(mask, "coated-gold"), (0.5, "varnished-paint"), (None, vt.Stack([vt.Diffuse(albedo=0.3)]))])
+    made = osl(mix)
+    assert made.turns and made.text.count("shader ") == 1
+    assert f'string part0_weight_map = "{tmp_path}/worn.png"' in made.text
+    assert "float part0_weight = clamp(vt_channel(part0_weight_map, 1, UV) * 1.0 + 0.0, 0.0, 1.0);" in made.text
+    assert re.search(r'float part1_weight = 0\.5\n +\[\[ string label = "Part 1: weight"', made.text)
+    assert 'color part2_layer0_albedo = color(0.3)\n        [[ string label = "Part 2, Layer 0: albedo"' in made.text
+    for name in ("part0", "part1"):
+        assert re.search(rf"float vt_{name}_columns\[\d+\] = ", made.text)
+    fixed = osl(mix, "weier2020", constant=["part1_weight", "part0_layer0_eta"]).text
+    assert "part1_weight" not in fixed and "part0_layer0_eta" not in fixed and "part1_layer0_eta" in fixed
+    for loss in re.findall(r"cosine .*: (0\.\d+) of the light", made.text):
+        assert float(loss) < 0.1
+
+
+def test_losses_of_a_mixture_are_those_of_its_light() -> None:
+    """Expected: of two equal parts those of one; the closures of one alone are off by the share of the other."""
+    gold, model = Material.of(vt.preset("coated-rough-metal")), named("weier2020")
+    black = Material.of(vt.Stack([vt.Diffuse(albedo=0.0)]))
+    known = partial(closures.of_body, bsdf.body(gold, model), straight=False)
+    for one, two in zip(*(closures.losses(m, model, known) for m in ([(1.0, gold)], [(0.5, gold), (0.5, gold)]))):
+        assert two.variation == pytest.approx(one.variation, abs=5e-3)
+    for loss in closures.losses([(0.25, gold), (0.75, black)], model, known):
+        assert loss.variation == pytest.approx(1.5, abs=0.05)  # half of 3/4 over 1/4

@@ -2,6 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from functools import partial
+from pathlib import Path
 from textwrap import wrap
 from typing import Any
 from xml.sax.saxutils import quoteattr
@@ -9,51 +13,56 @@ from xml.sax.saxutils import quoteattr
 import numpy as np
 
 from velatura.exports.request import Export, Request, origin, relative
+from velatura.model import Model
+from velatura.optics.ggx import Direction
 from velatura.programs import xml
-from velatura.shader import closures
+from velatura.shader import closures, mixture
+from velatura.shader.closures import Closure
 from velatura.shader.material import constant as as_constant
-from velatura.shader.material import identifier, title
+from velatura.shader.material import identifier, place, title
 from velatura.shader.printers import mtlx
-from velatura.shader.printers.nodes import constant
+from velatura.shader.printers.nodes import Node, NodeGraph, constant
 from velatura.shader.program import described
 from velatura.shader.recorder import recording
-from velatura.stack import Address, Stack, Varying, single
+from velatura.stack import Address, Stack, Varying
+from velatura.stack.flat_names import prefix
 
 LINE = 110  # characters of comments
 
 
 def write(request: Request) -> Export:
-    """The node, its graphs, and a material that uses it.
+    """The node of each stack, its graphs, and a material that uses it, or mixes those of several.
 
     Raises:
-        InvalidInput: as `velatura.shader.printers.mtlx.record`.
+        InvalidInput: as `velatura.shader.printers.mtlx.record`; a texture has a curve.
     """
-    stack = single(request.material, "mtlx")
-    recorded = mtlx.record(stack, recording.drawn_by(stack, request.model))
-    name = identifier(stack)
-    node = f"velatura_lobes_{name}"
-    values = mtlx.values(stack, [*recorded.plain, *recorded.conserving])
-    made, connected = mtlx.varying(values, lambda path: relative(path, request.folder))
-    losses = closures.losses(closures.numbers(stack), request.model, recorded.known)
-    about = _about(request)
+    material, name = request.material, identifier(request.material)
+    mtlx.check(material.values())
+    parts = [_Part.of(path, stack, request) for path, stack in material.leaves()]
+    nodes, halves = NodeGraph("value"), closures.shares(material)
+
+    def known(w: Direction) -> list[Closure]:
+        return closures.weighted(halves, [part.recorded.known(w) for part in parts])
+
+    numbers = [(share, closures.numbers(part.stack)) for share, part in zip(halves, parts)]
+    losses = closures.losses(numbers, request.model, known)
+
+    # Use the nodes of the stacks
+    file = partial(relative, folder=request.folder)
+    lobes = [part.used(nodes, file) for part in parts]
+    weights = dict(mixture.weights(material))
+    masks = {f"m.{place(at)}": node for at, node in mtlx.varying(nodes, weights.items(), file).items()}
+    constant = [at.name for at, x in weights.items() if not isinstance(x, Varying)]
+    bsdf = mtlx.mixed(nodes, lobes, mixture.shares(material, constant), masks)
+    about = _about(request, [part.model for part in parts])
     lines = [
         '<?xml version="1.0"?>',
         '<materialx version="1.39" colorspace="lin_rec709">',
         *xml.comment([*about, *(f"  {loss}" for loss in losses)]),
-        f'  <nodedef name="ND_{node}" node="{node}" nodegroup="pbr" doc={quoteattr(about[0])}>',
-        *(_input(stack, *each) for each in values),
-        '    <input name="normal" type="vector3" defaultgeomprop="Nworld" />',
-        '    <input name="tangent" type="vector3" defaultgeomprop="Tworld" />',
-        '    <output name="out" type="BSDF" />',
-        "  </nodedef>",
-        *mtlx.graph(f"NG_{node}", node, "", stack, recorded.conserving),
-        *mtlx.graph(f"NG_{node}_genosl", node, ' target="genosl"', stack, recorded.plain),
-        *made,
-        f'  <{node} name="{name}_lobes" type="BSDF">',
-        *connected,
-        f"  </{node}>",
+        *(line for part in parts for line in part.defined(about[0])),
+        *(line.removeprefix("  ") for line in nodes.lines),
         f'  <surface name="{name}_surface" type="surfaceshader">',
-        f'    <input name="bsdf" type="BSDF" nodename="{name}_lobes" />',
+        f'    <input name="bsdf" type="BSDF" {bsdf.where} />',
         "  </surface>",
         f'  <surfacematerial name="{name}" type="material">',
         f'    <input name="surfaceshader" type="surfaceshader" nodename="{name}_surface" />',
@@ -64,17 +73,61 @@ def write(request: Request) -> Export:
     return Export("\n".join(lines))
 
 
-def _about(request: Request) -> list[str]:
-    stack, varying = request.material, not recording.is_uniform(request.material)
+@dataclass(frozen=True)
+class _Part:
+    """A stack, recorded, and the name that its nodes have."""
+
+    stack: Stack
+    model: Model
+    recorded: mtlx.Recorded
+    name: str
+
+    @classmethod
+    def of(cls, path: tuple[int, ...], stack: Stack, request: Request) -> _Part:
+        model, name = recording.drawn_by(stack, request.model), f"{identifier(request.material)}_{prefix(path)}"
+        return cls(stack, model, mtlx.record(stack, model), name.removesuffix("_"))
+
+    @property
+    def values(self) -> list[tuple[Address, Any]]:
+        """The values that its lobes are worked out from."""
+        return mtlx.values(self.stack, [*self.recorded.plain, *self.recorded.conserving])
+
+    def defined(self, about: str) -> list[str]:
+        """The definition of its node, and its graphs."""
+        node, stack = self._node, self.stack
+        return [
+            f'  <nodedef name="ND_{node}" node="{node}" nodegroup="pbr" doc={quoteattr(about)}>',
+            *(_input(stack, *each) for each in self.values),
+            '    <input name="normal" type="vector3" defaultgeomprop="Nworld" />',
+            '    <input name="tangent" type="vector3" defaultgeomprop="Tworld" />',
+            '    <output name="out" type="BSDF" />',
+            "  </nodedef>",
+            *mtlx.graph(f"NG_{node}", node, "", stack, self.recorded.conserving),
+            *mtlx.graph(f"NG_{node}_genosl", node, ' target="genosl"', stack, self.recorded.plain),
+        ]
+
+    def used(self, nodes: NodeGraph, file: Callable[[Path], str]) -> Node:
+        """Its node, with its values that vary."""
+        varying = mtlx.varying(nodes, self.values, file)
+        return nodes.node(self._node, "BSDF", f"{self.name}_lobes", **{at.name: node for at, node in varying.items()})
+
+    @property
+    def _node(self) -> str:
+        return f"velatura_lobes_{self.name}"
+
+
+def _about(request: Request, models: Sequence[Model]) -> list[str]:
+    material, varying = request.material, not all(recording.is_uniform(stack) for _, stack in request.material.leaves())
     over = "computed from the values of layers, which are inputs" if varying else "polynomials of the direction of view"
     text = (
         f"Weights and roughnesses of its lobes are {over}. All targets but genosl are taken to return the light that"
         " facets block."
-        f"{' It looks alike from both sides.' * stack.transmits}"
+        f"{' It looks alike from both sides.' * any(stack.transmits for _, stack in material.leaves())}"
         f" Difference of its closures from the model{', where textures are half bright' * varying}, in light from"
         " above, as total variation and as the greatest difference of albedo:"
     )
-    name = f"{title(stack)}, by the model {described(recording.drawn_by(stack, request.model))}; MaterialX."
+    by = " and ".join(dict.fromkeys(map(described, models)))
+    name = f"{title(material)}, by the model {by}; MaterialX."
     return [name, origin(), *wrap(text, LINE)]
 
 

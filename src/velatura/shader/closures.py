@@ -7,7 +7,7 @@ facets, as renderers have it; lobes in their own media are drawn outside; all ot
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Iterator, Sequence
+from collections.abc import Callable, Collection, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import partial
 from math import isclose, pi
@@ -19,12 +19,13 @@ from numpy.typing import NDArray
 from velatura import ops
 from velatura.model import Model, variance_kind
 from velatura.model.base import Query
-from velatura.model.context import Context, at_a_point
+from velatura.model.context import at_a_point
 from velatura.model.directions import upright
 from velatura.model.guards import ALPHA_MIN
 from velatura.model.lobe_statistics import LobeStatistics, StackLobes
 from velatura.model.papers import bsdf
 from velatura.model.roughness_maps import AS_IT_IS
+from velatura.model.side_by_side import SideBySide
 from velatura.model.variance import Covariance, Isotropic, PerAxis, Roughness, Variance
 from velatura.ops import Value
 from velatura.optics import fresnel, ggx, refraction
@@ -35,8 +36,9 @@ from velatura.renderer.directional_grid import Curves
 from velatura.renderer.low_discrepancy import fibonacci, square
 from velatura.shader.lookups import films
 from velatura.shader.recorder import recording
-from velatura.stack import Address, Brushing, Material, Stack, Texture
+from velatura.stack import Address, Brushing, Described, Material, Stack, Texture
 from velatura.stack import number as plain
+from velatura.stack.mix import WEIGHT
 
 Array = NDArray[np.floating]
 
@@ -100,13 +102,24 @@ def in_closed_form(
 
 def numbers(stack: Stack) -> Material:
     """A stack with numbers in place of what varies: those of texels of .5."""
+    return Material.of(stack, _number).solid()
 
-    def value(address: Address, described: Any) -> Value:
-        if isinstance(described, Texture):
-            return float(np.clip(0.5 * described.scale + described.offset, *address.declared.within))
-        return described.offset if isinstance(described, Brushing) else plain(address, described)
 
-    return Material.of(stack, value).solid()
+def shares(material: Described) -> list[float]:
+    """The share of every stack, by the same numbers."""
+    weights = {at.name: _number(at, value) for at, value in material.values() if at.declared is WEIGHT}
+    return [float(share) for share in material.shares(weights)]
+
+
+def _number(address: Address, described: Any) -> Value:
+    if isinstance(described, Texture):
+        return float(np.clip(0.5 * described.scale + described.offset, *address.declared.within))
+    return described.offset if isinstance(described, Brushing) else plain(address, described)
+
+
+def weighted(shares: Iterable[Value], each: Iterable[Sequence[Closure]]) -> list[Closure]:
+    """The closures of all stacks, by the shares of these."""
+    return [closure._replace(weight=closure.weight * share) for share, own in zip(shares, each) for closure in own]
 
 
 def _separable(w: Direction, roughness: Roughness) -> Value:
@@ -368,10 +381,9 @@ class Loss:
         return f"cosine {self.cosine:g}: {self.variation:.3f} of the light, albedo {self.albedo:.4f}"
 
 
-def losses(material: Material, model: Model, closures: Closures) -> Iterator[Loss]:
-    """Losses of the closures of a material with values in NumPy, for light from above."""
-    material = material.solid()
-    body = model.body(material, variance_kind(material), Context())
+def losses(materials: Iterable[tuple[float, Material]], model: Model, closures: Closures) -> Iterator[Loss]:
+    """Losses of the closures of materials with shares and values in NumPy, for light from above."""
+    body = SideBySide.of(((share, each.solid()) for share, each in materials), model)
     asked = Query(radiance=False)
     u1, u2 = square(PAIRS)
     u = (np.arange(PAIRS) + 0.5) / PAIRS
@@ -380,7 +392,7 @@ def losses(material: Material, model: Model, closures: Closures) -> Iterator[Los
         one = x[:1], y[:1], z[:1]
         found = closures(one)
         mine = _samples(found, one, PAIRS)
-        theirs, _ = body.sample((x, y, z), u, u1, u2, asked)
+        theirs = body.sample((x, y, z), u, u1, u2, asked)
         truth, approximate = np.zeros(3), np.zeros(3)
         apart = 0.0
         for wo in (mine, theirs):

@@ -2,18 +2,22 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Collection, Iterator, Sequence
 from dataclasses import dataclass
 
 from velatura import ops
-from velatura.shader import material
+from velatura.ops import Value
+from velatura.shader.lookups.films import FILM
+from velatura.shader.material import member, place
 from velatura.shader.part import PartCode
 from velatura.shader.printers.printer import Field, Member, Struct
 from velatura.shader.recorder.cost import Cost, cost
-from velatura.shader.recorder.graph import Graph
-from velatura.shader.recorder.symbol import Operand, number
-from velatura.stack import Address, Mix
+from velatura.shader.recorder.graph import Graph, renamed
+from velatura.shader.recorder.symbol import Operand, Symbol, number, operand
+from velatura.stack import Address, Described, Mix
 from velatura.stack import number as plain
+from velatura.stack.flat_names import prefix
 from velatura.stack.mix import WEIGHT
 
 
@@ -33,7 +37,7 @@ class Mixture:
         used = [first.setdefault(part.pattern, part) for part in parts]
         each = zip(parts, used, shares(mix, constant))
         members = [Member(part.member, other.prefix, share) for part, other, share in each]
-        return cls(parts, list(first.values()), members, [at.name for at in _weights(mix) if at.name not in constant])
+        return cls(parts, list(first.values()), members, [at.name for at, _ in weights(mix) if at.name not in constant])
 
     @property
     def values(self) -> Struct:
@@ -44,19 +48,19 @@ class Mixture:
     @property
     def lobes(self) -> Struct:
         """The struct of the shares and lobes of all parts."""
-        shares = [Field(f"{member.name}_share", "number") for member in self.members]
+        shares = [Field(f"{name}_share", "number") for name, _, _ in self.members]
         return Struct("VtLobes", [*shares, *self._each("VtLobes")], "of light from one direction, with shares of parts")
 
     def _each(self, struct: str) -> Iterator[Field]:
-        for member in self.members:
-            (own,) = (part for part in self.own if part.prefix == member.functions)
-            yield Field(member.name, own.named(struct))
+        for name, functions, _ in self.members:
+            (own,) = (part for part in self.own if part.prefix == functions)
+            yield Field(name, own.named(struct))
 
     @property
     def costs(self) -> dict[str, Cost]:
         """The cost of each function, where every part has a share; a sample is that of the dearest."""
         each = [part.costs for part in self.parts]
-        shared = cost([member.share for member in self.members], 0)
+        shared = cost([share for _, _, share in self.members], 0)
         added = {name: [costs[name] for costs in each] for name in each[0]}
         dearest = max(added.pop("vt_sample"), key=lambda own: (own.operations, own.texels))
         added["vt_lobes"].append(shared)
@@ -67,16 +71,32 @@ class Mixture:
         return {**summed, "vt_sample": dearest}
 
 
-def shares(mix: Mix, constant: Collection[str]) -> list[Operand]:
+def shares(material: Described, constant: Collection[str]) -> list[Operand]:
     """The share of every stack, recorded from the weights that are not constant."""
 
     def weight(at: Address, value: object) -> object:
-        return plain(at, value) if at.name in constant else number(f"m.{material.place(at)}")
+        return plain(at, value) if at.name in constant else number(f"m.{place(at)}")
 
     with ops.readable():
-        found = mix.shares({at.name: weight(at, value) for at, value in mix.values() if at.declared is WEIGHT})
+        found = material.shares({at.name: weight(at, value) for at, value in weights(material)})
     return Graph().unique(found)
 
 
-def _weights(mix: Mix) -> Iterator[Address]:
-    return (at for at, _ in mix.values() if at.declared is WEIGHT)
+def named_after(parts: tuple[int, ...], outputs: Sequence[Value]) -> list[Operand]:
+    """The outputs of a stack with the names that its inputs, its tables of films and its lobes over direction have in
+    a mixture."""
+    own, within = prefix(parts), f"m.{member(parts)}."
+
+    def name(symbol: Symbol) -> object:
+        if symbol.op == "input":
+            return re.sub(r"^m\.", within, symbol.detail)
+        if symbol.op == FILM:
+            return own + symbol.detail
+        return symbol.detail._replace(name=own + symbol.detail.name) if symbol.op == "baked" else None
+
+    return renamed(outputs, name) if parts else list(map(operand, outputs))
+
+
+def weights(material: Described) -> Iterator[tuple[Address, object]]:
+    """The weights of a mixture."""
+    return ((at, value) for at, value in material.values() if at.declared is WEIGHT)

@@ -6,7 +6,7 @@ values come from textures the graph holds the layers, of a model in closed form.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from math import degrees
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -27,8 +27,8 @@ from velatura.shader.printers.nodes import LOOKED_UP, Node, NodeGraph, constant,
 from velatura.shader.program import described
 from velatura.shader.recorder import recording
 from velatura.shader.recorder.graph import Graph
-from velatura.shader.recorder.symbol import colour, in_order, number
-from velatura.stack import Address, Brushing, Stack, Texture, Varying
+from velatura.shader.recorder.symbol import Operand, colour, in_order, number
+from velatura.stack import Address, Brushing, Stack, Texture
 
 SLIGHT = 1e-6  # of its tangent, so that it has an azimuth
 INDEX_MIN = 1.223  # beyond a surface that refracts: MaterialX derives it from a reflectance of .01 at least
@@ -44,12 +44,19 @@ class Recorded(NamedTuple):
     known: Closures
 
 
+def check(values: Iterable[tuple[Address, Any]]) -> None:
+    """Refuse textures that have a curve."""
+    for at, x in values:
+        if isinstance(x, Texture) and x.curve is not None:
+            raise InvalidInput(f"mtlx: {at.name}: textures with a curve are for osl and blender")
+
+
 def record(stack: Stack, model: Model) -> Recorded:
     """The closures of a material, by a model that shaders of it compute.
 
     Raises:
-        InvalidInput: values come from textures, and the model looks up tables or the texture has a curve; or light
-            passes into a medium of an index that MaterialX has not.
+        InvalidInput: values come from textures, and the model looks up tables; or light passes into a medium of an
+            index that MaterialX has not.
     """
     wi = recording.direction("wi")
     found = _uniform(stack, model, wi) if recording.is_uniform(stack) else _layers(stack, model, wi)
@@ -66,9 +73,6 @@ def _uniform(stack: Stack, model: Model, wi: Direction) -> Recorded:
 
 
 def _layers(stack: Stack, model: Model, wi: Direction) -> Recorded:
-    for at, x in stack.values():
-        if isinstance(x, Texture) and x.curve is not None:
-            raise InvalidInput(f"mtlx: {at.name}: textures with a curve are for osl and blender")
     found, known = closures.in_closed_form(stack, model, (), wi)
     read = {symbol.op for symbol in in_order(Graph().unique([x for c in found for x in (c.weight, *c.roughness)]))}
     if read & LOOKED_UP:
@@ -109,19 +113,30 @@ def values(stack: Stack, found: Sequence[Closure]) -> list[tuple[Address, Any]]:
     return [(at, x) for at, x in stack.values() if f"m.{place(at)}" in read]
 
 
-def varying(values: Sequence[tuple[Address, Any]], file: Callable[[Path], str]) -> tuple[list[str], list[str]]:
-    """Nodes of values that vary, and the inputs that take them; `file` gives the path of an image."""
-    nodes, connected = NodeGraph("value"), []
+def varying(
+    nodes: NodeGraph, values: Iterable[tuple[Address, Any]], file: Callable[[Path], str]
+) -> dict[Address, Node]:
+    """Nodes of values that vary; `file` gives the path of an image."""
+    found: dict[Address, Node] = {}
     for at, x in values:
-        if not isinstance(x, Varying):
-            continue
         if isinstance(x, Brushing):
-            found = _angle(nodes, x)
-        else:
-            assert isinstance(x, Texture)
-            found = _image(nodes, at, x, file(x.texture))
-        connected.append(f'    <input name="{at.name}" type="{found.kind}" {found.where} />')
-    return [line.removeprefix("  ") for line in nodes.lines], connected
+            found[at] = _angle(nodes, x)
+        elif isinstance(x, Texture):
+            found[at] = _image(nodes, at, x, file(x.texture))
+    return found
+
+
+def mixed(nodes: NodeGraph, lobes: Sequence[Node], shares: Sequence[Operand], weights: Mapping[str, Node]) -> Node:
+    """The BSDF of stacks side by side, by those of each: each is mixed with all that follow it."""
+    rest: Value = 1.0
+    over = []
+    for share in shares[:-1]:
+        over.append(ops.divide(share, rest))
+        rest = rest - share
+    found = lobes[-1]
+    for lobe, weight in zip(lobes[-2::-1], nodes.recorded(over, weights)[::-1]):
+        found = nodes.node("mix", "BSDF", fg=lobe, bg=found, mix=weight)
+    return found
 
 
 def _angle(nodes: NodeGraph, brushing: Brushing) -> Node:

@@ -45,8 +45,8 @@ class NodeGraph:
         self.lines: list[str] = []
         self.prefix = prefix
 
-    def node(self, category: str, kind: str, **inputs: Node) -> Node:
-        name = f"{self.prefix}{len(self.lines)}"
+    def node(self, category: str, kind: str, name: str = "", /, **inputs: Node) -> Node:
+        name = name or f"{self.prefix}{len(self.lines)}"
         each = "".join(f'<input name="{key}" type="{x.kind}" {x.where} />' for key, x in inputs.items())
         self.lines.append(f'    <{category} name="{name}" type="{kind}">{each}</{category}>')
         return Node(kind, f'nodename="{name}"')

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Collection, Iterator, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache
 from textwrap import wrap
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,23 +15,25 @@ from numpy.typing import NDArray
 from velatura import ops, tables
 from velatura.errors import remark
 from velatura.model import DEFAULT, Model, named
-from velatura.model.variance import Isotropic
+from velatura.model.variance import Isotropic, Roughness
 from velatura.ops import Value
 from velatura.optics.ggx import Direction
 from velatura.renderer import directional_grid
 from velatura.shader import closures
 from velatura.shader.closures import Closure, Closures, ColumnReader, Loss, TabulatedClosures
 from velatura.shader.lookups import atlas, films
-from velatura.shader.lookups.lookup import Group, together
+from velatura.shader.lookups.lookup import together
 from velatura.shader.material import brushed, identifier, place, title
 from velatura.shader.material import constant as as_constant
+from velatura.shader.mixture import named_after, shares
 from velatura.shader.printers.printer import ATOM, Language
 from velatura.shader.printers.statements import statements
 from velatura.shader.program import described
 from velatura.shader.recorder import recording
 from velatura.shader.recorder.graph import Graph
 from velatura.shader.recorder.symbol import Kind, Operand, Symbol, in_order, operand
-from velatura.stack import Address, Brushing, MaterialLike, Stack, Texture, Varying, single
+from velatura.stack import Address, Brushing, Described, MaterialLike, Stack, Texture, Varying, load
+from velatura.stack.flat_names import prefix
 
 LINE = 116  # characters of comments
 ACROSS = 12  # numbers of an array on a line
@@ -104,8 +106,9 @@ class Osl(Language):
         at = ", ".join([*map(str, nodes), *args])
         return [f"float {name}[{channels}];", f"vt_texels(vt_{table}, {at}, {name});"]
 
-    def baked(self, name: str, group: Group, place: Sequence[str]) -> list[str]:
-        return [f"float {name}[{group.texels}];", f"vt_closures(vt_columns, {', '.join(place)}, {name});"]
+    def baked(self, name: str, group: Any, place: Sequence[str]) -> list[str]:
+        at = ", ".join([*map(str, group.nodes), *place])
+        return [f"float {name}[{group.texels}];", f"vt_closures(vt_{group.name}, {at}, {name});"]
 
     def nodes(self, name: str, nodes: Sequence[float]) -> list[str]:
         return [f"float {name}[{len(nodes)}] = {{{', '.join(map(self.literal, nodes))}}};"]
@@ -142,43 +145,83 @@ def osl(
     """A material as a shader whose output `BSDF` is a sum of closures.
 
     Args:
-        stack: a material (a stack, a file, or a preset's name). Of models in closed form its values are parameters;
-            of a solved one the closures are tabulated over direction, but where values come from textures.
+        stack: a material (a stack, a mixture, a file, or a preset's name). Of models in closed form its values are
+            parameters; of a solved one the closures are tabulated over direction, but where values come from textures.
         constant: flat names of values that are worked in.
 
     Raises:
         InvalidInput: as `velatura.shader.record`; a thickness of a film that is a texture.
     """
-    stack, asked = single(stack, "shader code"), named(model, **switches)
-    for address, value in stack.values():
+    material, asked = load(stack), named(model, **switches)
+    for address, value in material.values():
         if address.film is not None:
             # A table over thickness, too, would be megabytes of code
             address.plain(value, "in OSL films have no textures")
-    chosen = recording.drawn_by(stack, asked)
-    recording.check_constant(stack, constant)
-    numbers, wi = closures.numbers(stack), recording.direction("wi")
-    baked: TabulatedClosures | None = None
+    recording.check_constant(material, constant)
+    wi = recording.direction("wi")
+    parts = [_Part.of(path, each, asked, constant, wi) for path, each in material.leaves()]
+    found = closures.weighted(shares(material, constant), [part.found for part in parts])
+    halves = closures.shares(material)
+    numbers = [(share, closures.numbers(part.stack)) for share, part in zip(halves, parts)]
+
+    def known(w: Direction) -> list[Closure]:
+        return closures.weighted(halves, [part.known(w) for part in parts])
+
+    return _Program(material, parts, found, list(closures.losses(numbers, asked, known))).made()
+
+
+@dataclass(frozen=True)
+class _Part:
+    """A stack: its closures, recorded with the names of its part, and in NumPy; and what they look up, by name."""
+
+    stack: Stack
+    model: Model
+    found: Sequence[Closure]
     known: Closures
-    with ops.readable():
-        if chosen.closed_form:
-            found, known = closures.in_closed_form(stack, chosen, constant, wi)
-        else:
-            baked = closures.tabulated(numbers, chosen)
-            found, known = _read(baked, wi), baked.above
-    return _Program(stack, chosen, found, baked, list(closures.losses(numbers, asked, known))).made()
+    films: Mapping[str, Array]
+    columns: Mapping[str, Array]
+
+    @classmethod
+    def of(cls, parts: tuple[int, ...], stack: Stack, asked: Model, constant: Collection[str], wi: Direction) -> _Part:
+        chosen, own, known = recording.drawn_by(stack, asked), prefix(parts), closures.numbers(stack)
+        columns: dict[str, Array] = {}
+        with ops.readable():
+            if chosen.closed_form:
+                constants = [name for name in stack.flat() if own + name in constant]
+                found, above = closures.in_closed_form(stack, chosen, constants, wi)
+            else:
+                baked = closures.tabulated(known, chosen)
+                found, above = _read(baked, wi), baked.above
+                columns[f"{own}columns"] = baked.rows
+        numbers = [x for closure in found for x in (closure.weight, *closure.roughness, closure.eta)]
+        filmed = films.tables(stack, films.read_by(in_order(Graph().unique(numbers))), chosen)
+        each = iter(named_after(parts, numbers))
+        found = [
+            Closure(closure.kind, next(each), Roughness(next(each), next(each), next(each)), next(each))
+            for closure in found
+        ]
+        return cls(stack, chosen, found, above, {own + name: table for name, table in filmed.items()}, columns)
+
+
+class _Columns(NamedTuple):
+    """The array of columns over direction: how many, and its nodes along each axis."""
+
+    name: str
+    texels: int
+    nodes: tuple[int, ...]
 
 
 def _read(baked: TabulatedClosures, wi: Direction) -> list[Closure]:
     """Closures that are read from the array of columns."""
-    group = Group("columns", 0, baked.rows.shape[-1])
+    array = _Columns("columns", baked.rows.shape[-1], baked.shape)
     above = wi[2] > 0
     one = len(baked.etas) == 1
     side = 0.0 if one else ops.select(above, 0.0, 1.0)
 
     def read(w: Direction) -> ColumnReader:
         at = [operand(x) for x in (*directional_grid.places(w, len(baked.shape)), side)]
-        texels = Symbol("baked", tuple(at), "texels", group)
-        return ColumnReader.of([Symbol("component", (texels,), "number", k) for k in range(group.texels)], together)
+        texels = Symbol("baked", tuple(at), "texels", array)
+        return ColumnReader.of([Symbol("component", (texels,), "number", k) for k in range(array.texels)], together)
 
     return baked.at(wi, read, baked.etas[0] if one else ops.select(above, *baked.etas))
 
@@ -187,10 +230,9 @@ def _read(baked: TabulatedClosures, wi: Direction) -> list[Closure]:
 class _Program:
     """The parts of a shader."""
 
-    stack: Stack
-    model: Model
+    material: Described
+    parts: Sequence[_Part]
     closures: Sequence[Closure]
-    baked: TabulatedClosures | None
     losses: Sequence[Loss]
 
     def made(self) -> OslShader:
@@ -201,41 +243,35 @@ class _Program:
         lines, texts = statements([(x, kind) for x, (_, kind) in zip(found, outputs)], OSL)
         symbols = in_order(found)
         read = {symbol.detail for symbol in symbols if symbol.op == "input"}
-        values = [(at, x) for at, x in self.stack.values() if f"m.{place(at)}" in read]
+        values = [(at, x) for at, x in self.material.values() if f"m.{place(at)}" in read]
         varying = [(at, x) for at, x in values if isinstance(x, Varying)]
         body = [*self._arrays(symbols, varying), *(_varied(at, x) for at, x in varying), *_FRAME, *lines, ""]
         body += _sum([closure.kind for closure in self.closures], [texts[k : k + 5] for k in range(0, len(texts), 5)])
         name, parameters = self._name(), ",\n".join(self._parameters(values))
         shader = "\n".join([f"shader {name}(", parameters, ")", "{", *_indented(body), "}", ""])
-        turns = recording.variance(self.stack) is not Isotropic
-        return OslShader("\n".join([self._header(), *self._helpers(shader), shader]), name, turns)
+        turns = any(recording.variance(part.stack) is not Isotropic for part in self.parts)
+        return OslShader("\n".join([self._header(), *_helpers(shader), shader]), name, turns)
 
     def _parameters(self, values: Sequence[tuple[Address, Any]]) -> list[str]:
         """The declarations of values, of the files of textures, and of the place on the surface."""
-        numbers = [_parameter(self.stack, at, x) for at, x in values if not isinstance(x, Varying)]
+        kinds = {path: stack.kinds for path, stack in self.material.leaves()}
+        numbers = [_parameter(kinds.get(at.parts, ()), at, x) for at, x in values if not isinstance(x, Varying)]
         files = [_file(f"{at.name}_map", x) for at, x in values if isinstance(x, Texture)]
         varies = any(isinstance(x, Varying) for _, x in values)
         return [*numbers, *files, *([_UV] if varies else []), *_PLACE]
 
-    def _helpers(self, shader: str) -> list[str]:
-        """The functions that a shader calls."""
-        found = [text for called, text in _HELPERS.items() if re.search(rf"\b{called}\(", shader)]
-        if self.baked:
-            found.append(_LOOKUP[len(self.baked.shape)].format(*self.baked.rows.shape, *self.baked.shape))
-        return found
-
     def _name(self) -> str:
         """An identifier."""
-        name = identifier(self.stack)
+        name = identifier(self.material)
         return f"vt_{name}" if name in OSL.words or not name[0].isalpha() else name
 
     def _header(self) -> str:
         """Comments that describe the material and what is lost."""
-        over = "Lobes are tabulated over the direction of view. " if self.baked else ""
-        varying = " where textures are half bright" if not recording.is_uniform(self.stack) else ""
+        over = "Lobes are tabulated over the direction of view. " if any(part.columns for part in self.parts) else ""
+        varying = " where textures are half bright" if not recording.is_uniform(self.material) else ""
         return _HEADER.format(
-            name=remark(title(self.stack)),
-            model=described(self.model),
+            name=remark(title(self.material)),
+            model=" and ".join(dict.fromkeys(described(part.model) for part in self.parts)),
             text="\n".join(f"// {line}" for line in wrap(_ABOUT.format(over=over, varying=varying), LINE)),
             lost="\n".join(f"//    {loss}" for loss in self.losses),
         )
@@ -244,13 +280,20 @@ class _Program:
         """The numbers that are looked up."""
         for name in sorted({symbol.detail for symbol in symbols if symbol.op in ("texels", "value")}):
             yield from _of_table(name)
-        for name, film in films.tables(self.stack, films.read_by(symbols), self.model).items():
-            yield from _array(name, film)
+        for part in self.parts:
+            for name, film in part.films.items():
+                yield from _array(name, film)
         for at, x in varying:
             if isinstance(x, Texture) and x.curve:
                 yield from _array(f"{at.name}_curve", np.array(x.curve))
-        if self.baked:
-            yield from _array("columns", self.baked.rows)
+        for part in self.parts:
+            for name, rows in part.columns.items():
+                yield from _array(name, rows)
+
+
+def _helpers(shader: str) -> list[str]:
+    """The functions that a shader calls."""
+    return [text for called, text in _HELPERS.items() if re.search(rf"\b{called}\(", shader)]
 
 
 @cache
@@ -265,15 +308,17 @@ def _array(name: str, values: Array) -> list[str]:
     return [f"float vt_{name}[{len(numbers)}] = {{", *lines[:-1], lines[-1].rstrip(","), "};"]
 
 
-def _parameter(stack: Stack, at: Address, value: Any) -> str:
-    """The declaration of a value."""
+def _parameter(kinds: Sequence[str], at: Address, value: Any) -> str:
+    """The declaration of a value of a stack of these kinds of layers."""
     number = as_constant(at, value)
     text = OSL.literal(operand(number)) if not at.colour or np.ndim(number) else OSL.colour([OSL.literal(number)])
     low, high = at.declared.within
-    layer = "" if at.layer is None else f"Layer {at.layer}: "
-    facts = [f'string label = "{layer}{at.key}"', f'string help = "{at.declared.doc}"']
-    if at.layer is not None:
-        facts.append(f'string page = "Layer {at.layer} ({stack.kinds[at.layer]})"')
+    part = f"Part {'.'.join(map(str, at.parts))}" if at.parts else ""
+    layer = "" if at.layer is None else f"Layer {at.layer}"
+    where = ", ".join(name for name in (part, layer) if name)
+    facts = [f'string label = "{where}{": " * bool(where)}{at.key}"', f'string help = "{at.declared.doc}"']
+    if where:
+        facts.append(f'string page = "{where}{"" if at.layer is None else f" ({kinds[at.layer]})"}"')
     facts += [f"float {name} = {x:g}" for name, x in (("min", low), ("max", high)) if abs(x) < LARGE]
     return f"    {_TYPES['colour' if at.colour else 'number']} {at.name} = {text}\n        [[ {', '.join(facts)} ]]"
 
@@ -481,29 +526,27 @@ color vt_colour(string file, point uv)
     return found;
 }
 """,
+    "vt_closures": """\
+// Weights and roughnesses over the cosine
+void vt_closures(float table[], int n, float x, float side, output float columns[])
+{
+    int count = arraylength(columns);
+    float position = clamp(x, 0.0, 1.0) * (n - 1);
+    int i = min(int(position), n - 2), a = (int(side) * n + i) * count;
+    for (int k = 0; k < count; k++)
+        columns[k] = mix(table[a + k], table[a + count + k], position - i);
 }
 
-_LOOKUP = {
-    1: """\
-// Weights and roughnesses over the cosine
-void vt_closures(float table[], float x, float side, output float columns[])
-{{
-    float position = clamp(x, 0.0, 1.0) * ({1} - 1);
-    int i = min(int(position), {3} - 2), a = (int(side) * {1} + i) * {2};
-    for (int k = 0; k < {2}; k++)
-        columns[k] = mix(table[a + k], table[a + {2} + k], position - i);
-}}
-""",
-    2: """\
-// Weights and roughnesses over cosine and azimuth
-void vt_closures(float table[], float x, float y, float side, output float columns[])
-{{
-    float px = clamp(x, 0.0, 1.0) * ({3} - 1), py = clamp(y, 0.0, 1.0) * ({4} - 1);
-    int i = min(int(px), {3} - 2), j = min(int(py), {4} - 2);
-    int a = (int(side) * {1} + i * {4} + j) * {2}, b = a + {4} * {2};
-    for (int k = 0; k < {2}; k++)
-        columns[k] = mix(mix(table[a + k], table[a + {2} + k], py - j),
-            mix(table[b + k], table[b + {2} + k], py - j), px - i);
-}}
+// The same over cosine and azimuth
+void vt_closures(float table[], int nx, int ny, float x, float y, float side, output float columns[])
+{
+    int count = arraylength(columns);
+    float px = clamp(x, 0.0, 1.0) * (nx - 1), py = clamp(y, 0.0, 1.0) * (ny - 1);
+    int i = min(int(px), nx - 2), j = min(int(py), ny - 2);
+    int a = (int(side) * nx * ny + i * ny + j) * count, b = a + ny * count;
+    for (int k = 0; k < count; k++)
+        columns[k] = mix(mix(table[a + k], table[a + count + k], py - j),
+            mix(table[b + k], table[b + count + k], py - j), px - i);
+}
 """,
 }

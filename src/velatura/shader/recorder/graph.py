@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Hashable, Mapping, Sequence
+from collections.abc import Callable, Collection, Hashable, Mapping, Sequence
 from dataclasses import dataclass, field
+from typing import Any
 
 from velatura.ops import Value
 from velatura.shader.recorder.symbol import Operand, Symbol, in_order, inside, operand
@@ -45,6 +46,15 @@ class Graph:
         elif args != symbol.args:
             found = self._known[key] = symbol.with_args(args)
         return found
+
+
+def renamed(outputs: Sequence[Value], name: Callable[[Symbol], Any]) -> list[Operand]:
+    """The outputs with other details of some symbols, where `name` gives any."""
+    found: dict[Symbol, Symbol] = {}
+    for symbol in in_order(outputs):
+        args = tuple(found[x] if isinstance(x, Symbol) else x for x in symbol.args)
+        found[symbol] = symbol.with_args(args, name(symbol))
+    return [found[x] if isinstance(x, Symbol) else x for x in map(operand, outputs)]
 
 
 def known_before(

@@ -61,10 +61,10 @@ class Symbol:
         self.op, self.args, self.kind, self.detail = op, args, kind, detail
         self.serial, self.title, self.name = next(_serials), ops.title(), ""
 
-    def with_args(self, args: tuple[Operand, ...]) -> Symbol:
-        """The same operation, made in the same block, on other arguments."""
+    def with_args(self, args: tuple[Operand, ...], detail: Any = None) -> Symbol:
+        """The same operation, made in the same block, on other arguments, and with another detail if given."""
         other = object.__new__(Symbol)
-        other.op, other.args, other.kind, other.detail = self.op, args, self.kind, self.detail
+        other.op, other.args, other.kind, other.detail = self.op, args, self.kind, detail or self.detail
         other.serial, other.title, other.name = self.serial, self.title, self.name
         return other
 
