@@ -14,10 +14,8 @@ import numpy as np
 
 from velatura.exports.request import Export, Request, origin, relative
 from velatura.model import Model
-from velatura.optics.ggx import Direction
 from velatura.programs import xml
 from velatura.shader import closures, mixture
-from velatura.shader.closures import Closure
 from velatura.shader.material import constant as as_constant
 from velatura.shader.material import identifier, place, title
 from velatura.shader.printers import mtlx
@@ -40,11 +38,8 @@ def write(request: Request) -> Export:
     mtlx.check(material.values())
     parts = [_Part.of(path, stack, request) for path, stack in material.leaves()]
     nodes, halves = NodeGraph("value"), closures.shares(material)
-
-    def known(w: Direction) -> list[Closure]:
-        return closures.weighted(halves, [part.recorded.known(w) for part in parts])
-
     numbers = [(share, closures.numbers(part.stack)) for share, part in zip(halves, parts)]
+    known = closures.side_by_side(halves, [part.recorded.known for part in parts])
     losses = closures.losses(numbers, request.model, known)
 
     # Use the nodes of the stacks

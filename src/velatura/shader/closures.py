@@ -122,6 +122,11 @@ def weighted(shares: Iterable[Value], each: Iterable[Sequence[Closure]]) -> list
     return [closure._replace(weight=closure.weight * share) for share, own in zip(shares, each) for closure in own]
 
 
+def side_by_side(shares: Sequence[float], each: Sequence[Closures]) -> Closures:
+    """The closures of stacks with these shares."""
+    return lambda wi: weighted(shares, [closures(wi) for closures in each])
+
+
 def _separable(w: Direction, roughness: Roughness) -> Value:
     """Albedo of a GGX reflection with separable masking over that with masking correlated by height: a fit within .006
     for cosines of .1 and more."""

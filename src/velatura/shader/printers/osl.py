@@ -163,10 +163,7 @@ def osl(
     found = closures.weighted(shares(material, constant), [part.found for part in parts])
     halves = closures.shares(material)
     numbers = [(share, closures.numbers(part.stack)) for share, part in zip(halves, parts)]
-
-    def known(w: Direction) -> list[Closure]:
-        return closures.weighted(halves, [part.known(w) for part in parts])
-
+    known = closures.side_by_side(halves, [part.known for part in parts])
     return _Program(material, parts, found, list(closures.losses(numbers, asked, known))).made()
 
 
