@@ -230,12 +230,12 @@ def left(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(distributed.Nanny, "_on_worker_exit", leave)
 
 
-def swept_with_a_kill(folder: Path) -> Any:
+def swept_with_a_kill(folder: Path, alpha: float = 0.3) -> Any:
     """Four points, of which one ends its process when it is first looked at."""
     killed = folder / "killed"
 
     def deadly(stack: vt.Stack, seed: int) -> dict[str, float]:
-        if stack.flat()["layer0_alpha_u"] == 0.3 and not killed.exists():
+        if stack.flat()["layer0_alpha_u"] == alpha and not killed.exists():
             killed.touch()
             os.kill(os.getpid(), signal.SIGKILL)
         return {"x": 1.0}
@@ -253,6 +253,26 @@ def test_a_process_that_dask_gives_up_is_started_again(tmp_path: Path) -> None:
 
     with dask.config.set({"distributed.deploy.lost-worker-timeout": "1s"}):
         assert swept_with_a_kill(tmp_path) == [1.0] * 4
+
+
+@pytest.mark.usefixtures("left")
+@pytest.mark.parametrize(("alpha", "failures"), [(0.1, 3), (0.3, 0)])
+def test_a_point_that_is_looked_at_alone_does_not_wait_for_ever(
+    alpha: float, failures: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Expected: an error where no process starts again; by the first point, or by one that has ended its process."""
+    import dask
+    import distributed  # noqa: F401  (has the configuration that is changed)
+
+    from velatura.sweeps import engines
+
+    monkeypatch.setattr(engines, "ABSENT", 1.0)
+    where = "before a point was stored" if alpha == 0.1 else r"with \d of 4 points stored"
+    with (
+        dask.config.set({"distributed.scheduler.allowed-failures": failures}),
+        pytest.raises(vt.VelaturaError, match=rf"a\.zarr: the executor broke down .* {where}"),
+    ):
+        swept_with_a_kill(tmp_path, alpha)
 
 
 @pytest.mark.usefixtures("left")
