@@ -14,6 +14,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
+import velatura as vt
 from velatura import kernel, scenes
 from velatura.errors import InvalidInput
 from velatura.scenes.environments import SOFTBOXES, sky
@@ -162,6 +163,27 @@ def test_a_texture_stands_upright(mi: Any) -> None:
     red = scenes.render(painted, scene="sphere", env="furnace", spp=4, size=(32, 32))[..., 0]
     quarters = [red[9:13, 9:13], red[9:13, 19:23], red[20:24, 9:13], red[20:24, 19:23]]
     assert [bool(quarter.mean() > 0.5) for quarter in quarters] == [True, False, False, False]
+
+
+def test_fourteen_coated_metals_share_their_kernels(mi: Any) -> None:
+    """Rationale: a kernel takes a third of a second to compile. Expected: values of a material, and addresses of a
+    scene's arrays, which differ each time, belong to none."""
+    import drjit as dr
+
+    def kernels(alpha: float, metal: str) -> set[str]:
+        coat = [vt.Interface(eta=1.5, alpha=alpha), vt.Medium(sigma_a=(alpha, 0.1, 0.2))]
+        material = vt.bsdf(vt.Stack([*coat, vt.Interface(conductor=metal, alpha=0.2)]))
+        with dr.scoped_set_flag(dr.JitFlag.KernelHistory):
+            dr.kernel_history_clear()
+            scenes.render(material, spp=1, size=(4, 4))
+            return {each["hash"] for each in dr.kernel_history([dr.KernelType.JIT])}
+
+    first = kernels(0.1, "Au")
+    assert 0 < len(first) < 12
+    for alpha in (0.0, 0.05, 0.2, 0.3, 0.5, 0.8):
+        for metal in ("Au", "Al"):
+            assert kernels(alpha, metal) == first
+    assert kernels(0.1, "Al") == first
 
 
 def test_several_materials_stand_side_by_side(mi: Any) -> None:

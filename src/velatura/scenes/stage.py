@@ -13,6 +13,7 @@ import numpy as np
 
 from velatura import kernel
 from velatura.errors import InvalidInput
+from velatura.renderer.packets import aligned
 from velatura.scenes.environments import emitter
 from velatura.scenes.objects import OBJECTS, View, ground, plinth
 from velatura.scenes.surfaces import Mesh
@@ -107,10 +108,10 @@ def mesh(mi: Any, surface: Mesh, bsdf: Any) -> Any:
     properties["mesh_bsdf"] = bsdf
     shape = mi.Mesh("", len(surface.positions), len(surface.triangles), properties, True, True)
     buffers = mi.traverse(shape)
-    buffers["vertex_positions"] = surface.positions.ravel().astype(np.float32)
-    buffers["vertex_normals"] = surface.normals.ravel().astype(np.float32)
-    buffers["vertex_texcoords"] = surface.uv.ravel().astype(np.float32)
-    buffers["faces"] = surface.triangles.ravel()
+    buffers["vertex_positions"] = aligned(surface.positions.ravel())
+    buffers["vertex_normals"] = aligned(surface.normals.ravel())
+    buffers["vertex_texcoords"] = aligned(surface.uv.ravel())
+    buffers["faces"] = aligned(surface.triangles.ravel(), np.uint32)
     buffers.update()
     return shape
 
