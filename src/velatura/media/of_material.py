@@ -1,13 +1,22 @@
-"""The phase function of a medium of a material."""
+"""The phase function of a medium of a material, and two lobes that stand in for it."""
 
 from __future__ import annotations
 
 import functools
 
+import numpy as np
+from numpy.typing import NDArray
+
 from velatura.media.tabulated import Tabulated
 from velatura.optics.phase import HenyeyGreenstein, PhaseFunction, Rayleigh, TwoLobes
 from velatura.stack import SlabValues
 from velatura.stack import phases as written
+
+Array = NDArray[np.floating]
+
+DRAWN = 4096  # cosines, for moments
+SPREAD_MIN = 1e-3
+G_MAX = 0.98
 
 
 def phase_of(layer: SlabValues) -> PhaseFunction:
@@ -17,6 +26,30 @@ def phase_of(layer: SlabValues) -> PhaseFunction:
         MissingTool: it is Mie's, and the package that works it out is not installed.
     """
     return HenyeyGreenstein(layer.g) if layer.phase is None else _of(layer.phase)
+
+
+def two_lobes(phase: PhaseFunction) -> TwoLobes:
+    """Two lobes with the first three moments of a phase function of numbers, or one of its asymmetry where its second
+    moment is less than that asks for."""
+    if isinstance(phase, TwoLobes):
+        return phase
+    if isinstance(phase, HenyeyGreenstein):
+        return TwoLobes(phase, phase, 1.0)
+    cosine = phase.sample((np.arange(DRAWN) + 0.5) / DRAWN)
+    first, second, third = (float(np.mean(x)) for x in _legendre(cosine))
+    spread = second - first * first
+    if spread < SPREAD_MIN:
+        only = HenyeyGreenstein(first)
+        return TwoLobes(only, only, 1.0)
+    # The asymmetries are the nodes of Gauss's quadrature of these moments
+    half, product = 0.5 * (third - first * second) / spread, (first * third - second * second) / spread
+    root = np.sqrt(half * half - product)
+    forward, backward = (float(np.clip(half + x, -G_MAX, G_MAX)) for x in (root, -root))
+    return TwoLobes(HenyeyGreenstein(forward), HenyeyGreenstein(backward), (first - backward) / (forward - backward))
+
+
+def _legendre(x: Array) -> tuple[Array, Array, Array]:
+    return x, 0.5 * (3 * x * x - 1), 0.5 * (5 * x * x * x - 3 * x)
 
 
 @functools.lru_cache(64)

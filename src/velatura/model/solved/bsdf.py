@@ -81,7 +81,7 @@ class Side:
     curves: Any
     shapes: tuple[Shape, ...]
     polynomial: Remainder
-    samples: RemainderSamples | TopSamples
+    samples: RemainderSamples
     transmission: Transmission | None
     colour: Callable[..., Value]
     colours: int
@@ -90,7 +90,9 @@ class Side:
 
     @property
     def declaration(self) -> Declaration:
-        return Declaration(len(self.shapes), len(fields(self.kind)), self.transmission is not None)
+        return Declaration(
+            len(self.shapes), len(fields(self.kind)), self.transmission is not None, self.top is not None
+        )
 
     def at(self, w: Direction) -> Columns:
         """The columns for a direction above."""
@@ -114,14 +116,15 @@ class Side:
     def part(self, k: int, w: Direction) -> SideView:
         """What light from a direction above sees of the reflected part of number k alone, which is the first one. In
         NumPy."""
-        weight, *roughness = self._only(w, self.declaration.part(k))
-        columns = Columns([weight], [tuple(roughness)], [], [], weight, 0.0, 0.0, None, None)
+        weight, *others = self._only(w, self.declaration.part(k))
+        of_top = others[0] if self.top and k == len(self.shapes) else None
+        columns = Columns([weight], [tuple(others)], [], [], weight, 0.0, 0.0, None, None, of_top)
         return replace(self, shapes=self.shapes[k : k + 1]).given(w, columns)
 
     def through(self, w: Direction) -> SideView:
         """What light from a direction above sees of all that passes. In NumPy."""
         passes = Parts(*self._only(w, self.declaration.through))
-        return replace(self, shapes=()).given(w, Columns([], [], [], [], 0.0, 0.0, 0.0, passes, None))
+        return replace(self, shapes=(), top=None).given(w, Columns([], [], [], [], 0.0, 0.0, 0.0, passes, None))
 
     def _only(self, w: Direction, chosen: Sequence[int]) -> list[Value]:
         """Values of columns of some numbers; others are not read."""
@@ -135,7 +138,8 @@ class Side:
         lobes = [shape.lobe(weight, self.kind(*numbers).roughness(ROOTS)) for shape, weight, numbers in every]
         # The axes of isotropic interfaces lie in the plane of incidence
         plane = ggx.plane(w) if self.kind is PerAxis else None
-        return SideView(self.shapes, lobes, plane, self.polynomial, self.samples, self.transmission, columns, self.top)
+        samples = TopSamples(self.samples, self.top, columns.of_top) if self.top else self.samples
+        return SideView(self.shapes, lobes, plane, self.polynomial, samples, self.transmission, columns, self.top)
 
 
 @dataclass(frozen=True)

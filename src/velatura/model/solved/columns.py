@@ -26,7 +26,8 @@ class Column:
 
 @dataclass(frozen=True)
 class Declaration:
-    """The columns of a side with so many lobes, of roughnesses of so many entries, and with what passes or without.
+    """The columns of a side with so many lobes, of roughnesses of so many entries, and with what passes, and a medium
+    on top, or without.
 
     They are in the order in which they are read, those of densities first. The chance of the remainder is what others
     leave.
@@ -35,6 +36,7 @@ class Declaration:
     lobes: int
     entries: int
     passes: bool
+    top: bool = False
 
     @property
     def columns(self) -> list[Column]:
@@ -44,7 +46,7 @@ class Declaration:
         if self.passes:
             found += [Column(f"passed_{part.name}", colour=part.name in Parts.COLOURS) for part in fields(Parts)]
             found.append(Column("passed", colour=True, energy=True))
-        return found
+        return [*found, Column("of_top")] if self.top else found
 
     def groups(self, colours: int) -> list[int]:
         """Which rows are read together: 1 for those that are read seldom."""
@@ -60,10 +62,12 @@ class Declaration:
         return [row for k in chosen for row in range(begins[k], begins[k + 1])]
 
     def part(self, k: int) -> list[int]:
-        """Numbers of the columns that make the reflected part of number k: weight, and roughness, which the last one,
-        the remainder, has not."""
+        """Numbers of the columns that make the reflected part of number k: weight and roughness, or of the last one,
+        the remainder, scale and the share of a medium on top, if there is one."""
         each = self.entries + 1
-        return [each * self.lobes + k, *(range(k * each, k * each + self.entries) if k < self.lobes else ())]
+        if k < self.lobes:
+            return [each * self.lobes + k, *range(k * each, k * each + self.entries)]
+        return [each * self.lobes + k, *([len(self.columns) - 1] if self.top else [])]
 
     @property
     def through(self) -> list[int]:
@@ -101,7 +105,8 @@ class Declaration:
             passes = Parts(*(by_name[f"passed_{part.name}"][0] for part in fields(Parts)))
             passed, chance = by_name["passed"][0], chance - passes.share
         (scale,), (rest,) = by_name["scale"], by_name["rest"]
-        return Columns(weights, roughness, chances, energies, scale, chance, rest, passes, passed)
+        of_top = by_name["of_top"][0] if self.top else None
+        return Columns(weights, roughness, chances, energies, scale, chance, rest, passes, passed, of_top)
 
 
 @dataclass(frozen=True)
@@ -109,6 +114,7 @@ class Columns:
     """One direction's values, or arrays (C, M) and (M,) over directions.
 
     `weights`, `roughness`, `chances` and `energies` are those of lobes; of the remainder `scale`, `chance` and `rest`.
+    `of_top` is the share of its samples that a medium on top has, None without one.
     """
 
     weights: list[Value]
@@ -120,15 +126,17 @@ class Columns:
     rest: Value
     passes: Parts | None
     passed: Value | None
+    of_top: Value | None = None
 
     @property
     def declaration(self) -> Declaration:
         entries = len(self.roughness[0]) if self.roughness else 0
-        return Declaration(len(self.weights), entries, self.passes is not None)
+        return Declaration(len(self.weights), entries, self.passes is not None, self.of_top is not None)
 
     @property
     def all(self) -> list[Value]:
         """Values in the order of the declaration."""
         found = [x for roughness, chance in zip(self.roughness, self.chances) for x in (*roughness, chance)]
         found += [*self.weights, self.scale, *self.energies, self.rest]
-        return [*found, *vars(self.passes).values(), self.passed] if self.passes else found
+        found += [*vars(self.passes).values(), self.passed] if self.passes else []
+        return found if self.of_top is None else [*found, self.of_top]

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence, Set
+from collections.abc import Callable, Iterator, Sequence, Set
 from dataclasses import dataclass, fields, replace
 from functools import cached_property
 from typing import Any, NamedTuple
@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from velatura import ops
+from velatura.media import of_material
 from velatura.model.base import Model
 from velatura.model.context import Context, channels
 from velatura.model.smooth_interface import SmoothInterface, smooth_interfaces
@@ -27,7 +28,7 @@ from velatura.model.solved.grid import Folded, Grid, Listed
 from velatura.model.solved.guards import ALBEDO_MIN, COS_ON_GRID_MIN, ENERGY_EPS, WIDTH_ALPHA_MAX
 from velatura.model.solved.lobes import refracted_lobe, remainder, top_medium, widths
 from velatura.model.solved.lobes.refracted_lobe import MediumIndex
-from velatura.model.solved.lobes.remainder import Remainder
+from velatura.model.solved.lobes.remainder import Remainder, RemainderSamples
 from velatura.model.solved.lobes.top_medium import ORDERS, TopMedium, TopSamples
 from velatura.model.solved.lobes.widths import Tensor
 from velatura.model.solved.sample_allocation import Demand
@@ -38,6 +39,7 @@ from velatura.model.solved.transmission.internal_reflections import Rest
 from velatura.model.variance import Covariance, Isotropic, PerAxis, Roughness, Variance
 from velatura.ops import Value
 from velatura.optics.ggx import Direction
+from velatura.optics.phase import HenyeyGreenstein, PhaseFunction
 from velatura.renderer import directional_grid, finite_differences, low_discrepancy
 from velatura.renderer.differentiated import Variables
 from velatura.renderer.differentiated import plain as plain
@@ -76,7 +78,7 @@ class LobeSpec:
 class Layout:
     """The lobes of a side, the interfaces that make a step of the index, the last one whose facets turn light, the
     slabs that scatter, by the number of interfaces above, and the indices of media that nodes are chosen for; the place
-    of a medium that scatters below no step of the index, None without one."""
+    of a medium that scatters below no step of the index, None without one, and whether either side has such a one."""
 
     lobes: list[LobeSpec]
     stepped: list[int]
@@ -84,6 +86,7 @@ class Layout:
     cloudy: list[int]
     indices: list[float]
     top: int | None
+    apart: bool
 
 
 @dataclass(frozen=True)
@@ -91,14 +94,14 @@ class SolvedSide:
     """A side of a material in NumPy: columns (C, M) and (M,) over the directions of a grid; numbers of the remainder,
     (C,), and the albedo that it gains by being clipped at 0, (C, cosines); the shape of each lobe whose integral
     has an edge between directions, else None; what passes, in a material that is drawn forward, else None; and where a
-    medium on top is apart, shares of its wider phase functions, (ORDERS, C), and chances, (3,)."""
+    side has a medium on top, shares of its wider phase functions, (ORDERS, C)."""
 
     columns: Columns
     polynomial: Remainder
     clipped: Array
     edged: Sequence[Shape | None]
     transmission: Transmission | None = None
-    top: tuple[Array, Array] | None = None
+    top: Array | None = None
 
     @cached_property
     def rows(self) -> Array:
@@ -111,9 +114,8 @@ class SolvedSide:
 
     @property
     def numbers(self) -> Array:
-        """Those of the remainder, (8 C,), and after them those of a medium on top."""
-        own = [] if self.top is None else [*self.top[0], self.top[1]]
-        return np.concatenate([*vars(self.polynomial).values(), *own])
+        """Those of the remainder, (8 C,), and after them those of a medium on top, (ORDERS C,)."""
+        return np.concatenate([*vars(self.polynomial).values(), *([] if self.top is None else self.top)])
 
     def weighed(self, factors: Sequence[Array], wanted: Demand) -> SolvedSide:
         """The side with weights of reflected parts, and of what passes, scaled by factors (C, M), and samples shared
@@ -173,8 +175,7 @@ class Solver:
 
     `shape` is that of the grid on which a renderer has the columns. `samples` are those of `reciprocal_balance`;
     `normals` are those of facets, and of lobes that are integrated, None for as many as usual, or as are asked for by
-    `finely`. A medium on top scatters `apart` from the remainder where materials have values of their own, none of a
-    table.
+    `finely`. A medium on top scatters by `phase_of` its values.
     """
 
     model: Model
@@ -186,7 +187,7 @@ class Solver:
     samples: int | None = None
     normals: int | None = None
     finely: bool = False
-    apart: bool = False
+    phase_of: Callable[[SlabValues], PhaseFunction] = of_material.phase_of
 
     @classmethod
     def of(cls, model: Model, variance: type[Variance], context: Context, material: Material | None = None) -> Solver:
@@ -227,7 +228,8 @@ class Solver:
         veiled: set[int] = set()
         for material in materials:
             veiled = veiled.union(*map(_veils, sides(material)))
-        return [layout_of(seen, veiled) for seen in zip(*map(sides, materials))]
+        found = [layout_of(seen, veiled) for seen in zip(*map(sides, materials))]
+        return [replace(layout, apart=any(each.apart for each in found)) for layout in found]
 
     def solve(self, material: Material, layouts: Sequence[Layout]) -> list[SolvedSide]:
         """A material with values of NumPy, each side."""
@@ -258,7 +260,7 @@ class Solver:
 
     def _in_numpy(self, material: Material, found: SolvedSide, layout: Layout, curves: Any) -> Side:
         polynomial = Remainder(*(np.reshape(x, (-1, 1)) for x in vars(found.polynomial).values()))
-        top = found.top and TopMedium.of(material, layout.top, found.top[0][..., None], found.top[1])
+        top = None if found.top is None else self.top(material, layout, [*found.top[..., None]])
         return self.side(material, layout, curves, polynomial, Context(colour=_stacked, tables=self.tables), top)
 
     def side(
@@ -272,10 +274,25 @@ class Solver:
     ) -> Side:
         """A side of a material of a renderer's values, those of one point or of all."""
         assert context.colour is not None
-        shapes = tuple(shapes_of(smooth_interfaces(material), layout.lobes))
-        samples = TopSamples(polynomial.samples, top) if top else polynomial.samples
+        shapes, samples = tuple(shapes_of(smooth_interfaces(material), layout.lobes)), polynomial.samples
         transmission = self.transmission(material, layout)
         return Side(curves, shapes, polynomial, samples, transmission, context.colour, self.colours, self.kind, top)
+
+    def of_numbers(
+        self, material: Material, layout: Layout, curves: Any, numbers: Sequence[Value], context: Context
+    ) -> Side:
+        """A side of a material of a renderer's values, with colours in the order of `SolvedSide.numbers`."""
+        count = len(fields(Remainder))
+        top = self.top(material, layout, numbers[count:]) if layout.apart else None
+        return self.side(material, layout, curves, Remainder(*numbers[:count]), context, top)
+
+    def top(self, material: Material, layout: Layout, shares: Sequence[Value]) -> TopMedium:
+        """The medium on top of a material in any dialect, with shares of its wider phase functions."""
+        if layout.top is None:
+            return TopMedium.of(None, HenyeyGreenstein(0.0), shares)
+        layer = material.layers[layout.top]
+        assert isinstance(layer, SlabValues)
+        return TopMedium.of(layer, self.phase_of(layer), shares)
 
     def transmission(self, material: Material, layout: Layout) -> Transmission | None:
         """What passes a material; None where nothing does."""
@@ -293,14 +310,14 @@ class Solver:
     def lit(self, material: Material, wi: Direction) -> Lit:
         """The upper side of a material of NumPy's values, solved for light from directions wi, (M,) each, alone."""
         (layout, *_), upper = self.layouts([material]), sides(material)[0]
-        found = replace(self, apart=layout.top is not None)._side(upper, layout, Listed(self.isotropic, wi))
+        found = self._side(upper, layout, Listed(self.isotropic, wi))
         return Lit(self._in_numpy(upper, found, layout, None), found.columns, wi)
 
     def _side(self, material: Material, layout: Layout, folded: Folded | Listed) -> SolvedSide:
         """A side of a material at some directions, in the order of the physics."""
-        light, polynomial, top = self._light(material, layout, folded)
+        light, polynomial, top, of_top = self._light(material, layout, folded)
         lobes = self._lobes(material, layout, folded, light)
-        clipped, peak = _clipped(polynomial, top, folded.at_cosines)
+        clipped, peak = _clipped(polynomial, top, of_top, folded.at_cosines)
         whole = polynomial.albedo(folded.cosine) + folded.around(clipped)
         drawn, rest = self._hand_over(_in_veils(layout, material, light), folded, lobes, light.rest, whole)
         scale = _scale(rest, whole)
@@ -317,18 +334,19 @@ class Solver:
             self._colours(rest),
             passes,
             self._colours(light.passed) if passes else None,
+            None if of_top is None else folded.around(of_top),
         )
         numbers = Remainder(*(np.broadcast_to(x[:, 0], self.colours) for x in vars(polynomial).values()))
         edged = self._edged(material, lobes, folded.phi)
         forward = transmission if self.model.form == "forward" else None
-        fitted = (np.stack([self._colours(x)[:, 0] for x in top.shares]), np.array(top.chances)) if top else None
+        fitted = np.stack([self._colours(x)[:, 0] for x in top.shares]) if top else None
         return SolvedSide(folded.unfolded(columns), numbers, self._colours(clipped), edged, forward, fitted)
 
     def _light(
         self, material: Material, layout: Layout, folded: Folded | Listed
-    ) -> tuple[Energies, Remainder, TopMedium | None]:
+    ) -> tuple[Energies, Remainder, TopMedium | None, Array | None]:
         """Solve for the energies of all parts, and fit the remainder's polynomial beside what a medium on top scatters
-        back."""
+        back; with the share of samples that the medium has, at cosines."""
         solved = energies(
             material,
             np.concatenate([folded.cosine, INCIDENCES]),
@@ -337,23 +355,26 @@ class Solver:
             widths.nearly_straight,
             samples=self.normals or (FINELY[0] if self.finely else SAMPLES),
             like=layout.indices,
-            events=self.apart and layout.top is not None,
+            events=layout.top is not None,
         )
         albedos = (solved.lobes.sum(axis=0) + solved.veils.sum(axis=0) + solved.rest)[:, folded.count :]
         light, own, others = solved.remainder, None, []
-        if self.apart and layout.top is not None:
-            own, *others = _scattered_back(material, layout.top, solved.nodes)
+        grey = _uncoloured(material)
+        if layout.top is not None:
+            own, *others = _scattered_back(self.top(grey, layout, ()), solved.nodes)
             light = light - own
             others = [np.broadcast_to(each, light.shape) for each in others]
         polynomial, shares = remainder.fit(solved.nodes, light, INCIDENCES, albedos, others)
-        top = None
+        top, of_top = None, None
         if own is not None:
-            energy = own + sum(share[:, None, None, None] * each for share, each in zip(shares, others))
-            chances = top_medium.chances(INCIDENCES, energy[:, 0].sum(axis=1), solved.rest[:, folded.count :])
-            top = TopMedium.of(_uncoloured(material), layout.top, shares[..., None], chances)
-        elif self.apart and material.transmits:
-            top = TopMedium.of(material, None, np.zeros((len(ORDERS), 1, 1)), np.zeros(3))
-        return solved.first(folded.count), Remainder(*(x[:, None] for x in vars(polynomial).values())), top
+            energy = (own + sum(share[:, None, None, None] * each for share, each in zip(shares, others)))[:, 0]
+            whole = solved.rest[:, folded.count :]
+            top = self.top(grey, layout, [*shares[..., None]])
+            of_top = top_medium.chances(INCIDENCES, energy.sum(axis=1), whole, folded.at_cosines[2])
+        elif layout.apart:
+            top, of_top = self.top(grey, layout, [np.zeros((1, 1))] * len(ORDERS)), 0 * folded.at_cosines[2]
+        found = Remainder(*(x[:, None] for x in vars(polynomial).values()))
+        return solved.first(folded.count), found, top, of_top
 
     def _lobes(self, material: Material, layout: Layout, folded: Folded | Listed, light: Energies) -> list[_Lobe]:
         """Work out the widths of lobes and veils."""
@@ -517,7 +538,6 @@ def solve(material: Material, model: Model, variance: type[Variance], context: C
     start, given = plain(material), Variables.of(material)
     solver = Solver.of(model, variance, context, start)
     layouts = solver.layouts([start])
-    solver = replace(solver, apart=any(layout.top is not None for layout in layouts))
 
     packings: list[Packing] = []
 
@@ -539,25 +559,11 @@ def solve(material: Material, model: Model, variance: type[Variance], context: C
         tables = [directional_grid.interleaved(next(flat), solver.shape, context.number) for _ in packing.tables]
         curves, column = packing.curves(tables), next(flat)
         numbers = column[:, None] if context.colour is channels else finite_differences.numbers(column, context.number)
-        top = top_of(seen, layout, numbers, solver, context) if solver.apart else None
-        made.append(solver.side(seen, layout, curves, remainder_of(numbers, solver, context), context, top))
+        made.append(solver.of_numbers(seen, layout, curves, coloured(numbers, solver, context), context))
     return solver.bsdf(material, made)
 
 
-def remainder_of(numbers: Sequence[Value], solver: Solver, context: Context) -> Remainder:
-    """The remainder of a renderer's numbers."""
-    return Remainder(*_coloured(numbers[: len(fields(Remainder)) * solver.colours], solver, context))
-
-
-def top_of(material: Material, layout: Layout, numbers: Sequence[Value], solver: Solver, context: Context) -> TopMedium:
-    """The medium on top of a material of a renderer's values, by the numbers that come after those of the remainder."""
-    begin = len(fields(Remainder)) * solver.colours
-    end = begin + len(ORDERS) * solver.colours
-    shares = _coloured(numbers[begin:end], solver, context)
-    return TopMedium.of(material, layout.top, shares, [ops.channel(x, 0) for x in numbers[end:]])
-
-
-def _coloured(numbers: Sequence[Value], solver: Solver, context: Context) -> list[Value]:
+def coloured(numbers: Sequence[Value], solver: Solver, context: Context) -> list[Value]:
     """A renderer's numbers, those of each colour in a row, as colours."""
     assert context.colour is not None
     width = solver.colours
@@ -565,10 +571,9 @@ def _coloured(numbers: Sequence[Value], solver: Solver, context: Context) -> lis
     return [context.colour(*each[k : k + width]) for k in range(0, len(each), width)]
 
 
-def _scattered_back(material: Material, place: int, nodes: Nodes) -> list[Array]:
+def _scattered_back(top: TopMedium, nodes: Nodes) -> list[Array]:
     """Light (C, modes, N, I) that a medium scatters back once by its phase function, and by wider ones without loss,
     from `INCIDENCES`."""
-    top = TopMedium.of(_uncoloured(material), place, (), ())
     depth, basis, p = np.ravel(top.depth), Relative(nodes, tuple(range(MODES))), np.sqrt(1 - INCIDENCES**2)
     own, *others = (escaped(phase, depth, basis, p) for phase in (top.phase, *top.wider))
     return [np.reshape(top.albedo, (-1, 1, 1, 1)) * own, *others]
@@ -590,15 +595,16 @@ def layout_of(materials: Sequence[Material], veiled: Set[int] = frozenset()) -> 
     lobes = [LobeSpec(k, widths.first_step(steps[:k]), veil, denser[k]) for k, veil in both]
     cloudy = sorted(set().union(*map(_cloudy, materials)))
     stepped = widths.stepped(steps)
-    last = rough[-1] if rough else None
-    return Layout(lobes, stepped, last, cloudy, media_of(materials[0]), _top(materials[0], stepped))
+    last, top = rough[-1] if rough else None, _top(materials, stepped)
+    return Layout(lobes, stepped, last, cloudy, media_of(materials[0]), top, top is not None)
 
 
-def _top(material: Material, stepped: Sequence[int]) -> int | None:
+def _top(materials: Sequence[Material], stepped: Sequence[int]) -> int | None:
     """Place of a medium that scatters light and has no step of the index above it; None without one."""
-    for place, layer in enumerate(material.layers):
+    for place, layer in enumerate(materials[0].layers):
         if isinstance(layer, SlabValues):
-            return place if np.any(layer.tau_s > 0) else None
+            slabs = (each.layers[place] for each in materials)
+            return place if any(isinstance(slab, SlabValues) and np.any(slab.tau_s > 0) for slab in slabs) else None
         if not isinstance(layer, InterfaceValues) or layer.kind != "dielectric" or layer.films or place in stepped:
             return None
     return None
@@ -640,12 +646,14 @@ def _uncoloured(material: Material) -> Material:
     return material.each(lambda _, value: channels(value) if np.ndim(value) else value)
 
 
-def _clipped(polynomial: Remainder, top: TopMedium | None, wi: Direction) -> tuple[Array, Array]:
-    """Albedo that a remainder of numbers (C, 1) gains by a medium on top, and by being clipped, and the largest weight
-    of its samples, (C, M)."""
+def _clipped(polynomial: Remainder, top: TopMedium | None, of_top: Array | None, wi: Direction) -> tuple[Array, Array]:
+    """Albedo that a remainder of numbers (C, 1) gains by a medium on top, which has a share `of_top` (M,) of samples,
+    and by being clipped, and the largest weight of samples, (C, M)."""
     numbers, top = direct.wider(polynomial), direct.wider(top)
     x, y, z = (each[:, None] for each in wi)
-    samples = TopSamples(numbers.samples, top) if top else numbers.samples
+    samples: RemainderSamples | TopSamples = numbers.samples
+    if top and of_top is not None:
+        samples = TopSamples(numbers.samples, top, of_top[:, None])
     # Not where it is sampled: directions of samples jump with the numbers
     cosine, turn = low_discrepancy.fibonacci(4 * EVENLY if top else EVENLY)
     sine, phi = np.sqrt(1 - cosine * cosine), 2 * np.pi * turn

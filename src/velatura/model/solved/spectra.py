@@ -21,7 +21,6 @@ from velatura.model.rough_interface import Facets
 from velatura.model.solved import monotone_cubic
 from velatura.model.solved.columns import Declaration
 from velatura.model.solved.energies.adding import Lambert, Part, parts
-from velatura.model.solved.lobes.remainder import Remainder
 from velatura.model.solved.rotation_frame import Frame, frame
 from velatura.model.solved.solve import Layout, SolvedSide, Solver, plain, sides
 from velatura.model.solved.texture_axes import Wavelengths
@@ -91,8 +90,8 @@ class Spectra:
         made = []
         for seen, layout, side in zip(sides(material), self.layouts, self.sides):
             curves = _OfRay(side, places, solver.colours)
-            polynomial = Remainder(*ops.interpolate(side.polynomial, places))
-            made.append(solver.side(seen, layout, curves, polynomial, context))
+            numbers = ops.interpolate(side.polynomial, places)
+            made.append(solver.of_numbers(seen, layout, curves, numbers, context))
         return self.frame.turned(solver.bsdf(material, made), turned)
 
 
@@ -149,7 +148,7 @@ def _flat(side: SolvedSide, solver: Solver, places: Array, nodes: int) -> list[A
     # A table has one column at least; without lobes none is read
     numbers = np.concatenate([each for each in columns if len(each) == 1] or [np.zeros_like(columns[0][:1])])
     colours = over_nodes(np.array([each.T for each in columns if len(each) > 1]), places, nodes)
-    polynomial = np.array(list(vars(side.polynomial).values()))
+    polynomial = side.numbers.reshape(-1, len(places))
     return [numbers.T.ravel(), np.moveaxis(colours, 0, -1).ravel(), over_nodes(polynomial, places, nodes).T.ravel()]
 
 

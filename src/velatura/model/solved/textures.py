@@ -28,7 +28,7 @@ from velatura.model.solved import solve, texture_axes
 from velatura.model.solved.bsdf import Side, Solved
 from velatura.model.solved.columns import Columns
 from velatura.model.solved.guards import ENERGY_EPS
-from velatura.model.solved.lobes import remainder
+from velatura.model.solved.lobes import remainder, top_medium
 from velatura.model.solved.rotation_frame import Frame
 from velatura.model.solved.solve import Layout, SolvedSide, Solver
 from velatura.model.solved.texture_axes import BESIDE, COARSE, WAVES_MAX, WAVES_OF_TWO, Range, TextureAxis, Wavelengths
@@ -130,8 +130,8 @@ class TextureTables:
             curves = partial(_together, [term.columns[k] for term in self.terms], places, self.adds[k])
             found = [term.polynomials[k].at(*at) for term, at in zip(self.terms, places)]
             numbers = [sum(each[1:], each[0]) for each in zip(*found)]
-            polynomial = solve.remainder_of(numbers, self.solver, self.context)
-            side = self.solver.side(seen, layout, curves, polynomial, self.context)
+            colours = solve.coloured(numbers, self.solver, self.context)
+            side = self.solver.of_numbers(seen, layout, curves, colours, self.context)
             made.append(_Interpolated(**vars(side), summed=len(self.terms) > 1))
         return self.solver.bsdf(material, made)
 
@@ -174,6 +174,7 @@ def _bounded(found: Columns, summed: bool) -> Columns:
         chances=[x / total for x in chances],
         chance=chance / total,
         passes=of,
+        of_top=None if found.of_top is None else ops.clip(found.of_top, 0.0, top_medium.MOST),
     )
 
 
@@ -286,8 +287,10 @@ def _tabulated(
                     scaled = np.exp(np.minimum(by, np.log(MOST)))
                     columns = np.where(add[:, None], _beyond(columns, group, known), scaled)
                     polynomials = _beyond(polynomials, group, known)
-                # Of two sides, sums take more of a step of an optimisation than fetches do
-                if summed := None if given.given or len(layouts) > 1 else _of_few(polynomials):
+                # Of two sides, sums take more of a step of an optimisation than fetches do; those of media on top have
+                # other functions
+                alone = not given.given and len(layouts) == 1 and not layouts[0].apart
+                if summed := _of_few(polynomials) if alone else None:
                     polynomials, few[k, side] = summed
                 if (k, side) not in packings:
                     packings[k, side] = tuple(

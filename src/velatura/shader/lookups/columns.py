@@ -8,8 +8,8 @@ constant ones are numbers in the code.
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
-from itertools import count
+from dataclasses import dataclass, fields, replace
+from itertools import count, islice
 from math import pi
 from typing import Any
 
@@ -17,13 +17,18 @@ import numpy as np
 from numpy.typing import NDArray
 
 from velatura import ops
+from velatura.media import of_material
+from velatura.media.of_material import two_lobes
+from velatura.media.tabulated import Tabulated
 from velatura.model import Model
 from velatura.model.base import Body
 from velatura.model.context import Context, at_a_point
 from velatura.model.solved import rotation_frame, solve
 from velatura.model.solved.bsdf import Side, Solved
 from velatura.model.solved.columns import Columns
+from velatura.model.solved.lobes import top_medium
 from velatura.model.solved.lobes.remainder import Remainder
+from velatura.model.solved.lobes.top_medium import TopMedium
 from velatura.model.solved.rotation_frame import Frame, Turned
 from velatura.model.solved.solve import Layout, SolvedSide, Solver
 from velatura.model.solved.transmission import direct
@@ -33,12 +38,13 @@ from velatura.model.variance import Covariance, Variance, is_same
 from velatura.ops import Value
 from velatura.optics import ggx
 from velatura.optics.ggx import Direction
+from velatura.optics.phase import HenyeyGreenstein, PhaseFunction, TwoLobes
 from velatura.shader.lookups.lookup import Group, LookUp, Texels, sides_read, texture, together
 from velatura.shader.recorder.seen import Seen
 from velatura.shader.recorder.symbol import LAYOUT, REMAINDER, SHOWN, colour, number
-from velatura.stack import InterfaceValues, Material, MediumValues, Stack
+from velatura.stack import InterfaceValues, Material, MediumValues, SlabValues, Stack
 
-OF_POLYNOMIAL = 8  # colours
+OF_TOP = 4  # numbers of a medium on top
 FAINTLY = 1e-3  # chance that is added to that of every reflected part, where some are shown alone
 NORMAL = (0.0, 0.0, 1.0)
 COARSE = 12, 144  # cosines, and normals
@@ -49,8 +55,8 @@ Array = NDArray[np.floating]
 
 @dataclass(frozen=True)
 class SolvedContents:
-    """Contents of a material for a shader: texels (height, width, 4), colours (8 sides, 3) of the remainders, and
-    numbers of its layout."""
+    """Contents of a material for a shader: texels (height, width, 4), colours (K sides, 3) of the remainders and of
+    media on top, and numbers of its layout."""
 
     texels: Array
     remainder: Array
@@ -133,7 +139,7 @@ class SolvedLookUp(LookUp):
             cosines, normals = COARSE
             solver = replace(solver, grid=replace(solver.grid, cosines=cosines), normals=normals)
         # All that its kind may draw, of its own shape
-        own = [replace(own, lobes=kind.lobes) for own, kind in zip(solver.layouts([material]), self.layouts)]
+        own = [_of_kind(layout, kind) for layout, kind in zip(solver.layouts([material]), self.layouts)]
         if coarse and solver.model.form == "forward":
             found = solver.solve(material, own[:1]) * self.sides
         else:
@@ -154,18 +160,19 @@ def tabulated(stack: Stack, material: Material, model: Model, variance: type[Var
         degrees = by = next(flags)
         material = material.each(lambda address, x: x - by if address.key == "rotation" else x)
     solver = Solver.of(model, variance, Context(), None if general else plain)
+    solver = replace(solver, phase_of=_of_numbers if general else _printed)
     layouts = solver.layouts([_eventful(plain) if general else plain])
     found = None if general else solver.solve(plain, layouts)
     rows = None if found is None else _rows(solver, found)
-    sides = []
+    sides, of_side = [], _colours_of(layouts[0])
     for k, (seen, layout) in enumerate(zip(solve.sides(material.solid()), layouts)):
-        colours = [colour(f"{REMAINDER}[{OF_POLYNOMIAL * k + j}]") for j in range(OF_POLYNOMIAL)]
-        polynomial = Remainder(*(_colours(found[k]) if found else colours))
+        colours = [colour(f"{REMAINDER}[{of_side * k + j}]") for j in range(of_side)]
         context = replace(at_a_point(), colour=together)
-        side = solver.side(seen, layout, None, polynomial, context)
-        sides.append(
-            replace(side, transmission=_any(side.transmission, flags)) if general and side.transmission else side
-        )
+        side = solver.of_numbers(seen, layout, None, [*_colours(found[k])] if found else colours, context)
+        if general:
+            side = replace(side, transmission=side.transmission and _any(side.transmission, flags))
+            side = replace(side, top=side.top and _any_top(seen, side.top, flags))
+        sides.append(side)
     groups, places = _placed(sides[0], rows)
     for k, beam in enumerate(sides_read(len(sides), model)[: len(sides)]):
         curves = _Curves(places, tuple(Texels(solver.shape, group, beam) for group in groups))
@@ -176,12 +183,13 @@ def tabulated(stack: Stack, material: Material, model: Model, variance: type[Var
         layout_numbers = _layout_numbers(solver, plain, layouts, None if angle is None else degrees)
         solved = SolvedContents(_texture(rows, places, groups, solver.shape), _remainders(found), layout_numbers)
     flagged = sum(len(_flags(side.transmission)) for side in sides if side.transmission)
+    flagged += sum(OF_TOP for side in sides if side.top)
     return SolvedLookUp(
         nodes=solver.shape,
         groups=groups,
         sides=len(sides),
         known=solved.texels if solved else None,
-        colours=OF_POLYNOMIAL * len(sides),
+        colours=of_side * len(sides),
         numbers=flagged + (angle is not None),
         straight=solver.bsdf(material.solid(), sides),
         angle=angle,
@@ -205,9 +213,12 @@ def _remainders(found: Sequence[SolvedSide]) -> Array:
 
 def _layout_numbers(solver: Solver, material: Material, layouts: Sequence[Layout], degrees: Value | None) -> Array:
     """The angle by which a material was turned back, if it may be, and the flags of its layout."""
-    transmissions = map(solver.transmission, solve.sides(material), layouts)
-    flags = [flag for transmission in transmissions if transmission for flag in _flags(transmission)]
-    return np.array(([] if degrees is None else [degrees]) + flags, np.float32)
+    flags: list[Value] = [] if degrees is None else [degrees]
+    for side, layout in zip(solve.sides(material), layouts):
+        transmission = solver.transmission(side, layout)
+        flags += _flags(transmission) if transmission else []
+        flags += _of_top(side, layout) if layout.apart else []
+    return np.array(flags, np.float32)
 
 
 def _flags(transmission: Transmission) -> list[Value]:
@@ -220,6 +231,46 @@ def _any(transmission: Transmission, flags: Iterator[Value]) -> Transmission:
     faces, under, scattered = (tuple(next(flags) for _ in transmission.refractions) for _ in range(3))
     bounces = len(transmission.refractions) > 1
     return replace(transmission, faces=faces, under=under, scattered=scattered, bounces=bounces)
+
+
+def _of_kind(layout: Layout, kind: Layout) -> Layout:
+    """The layout of a material with all that its kind draws, and nothing else."""
+    return replace(layout, lobes=kind.lobes, top=layout.top if kind.apart else None, apart=kind.apart)
+
+
+def _colours_of(layout: Layout) -> int:
+    """How many colours a side has, of its remainder and of a medium on top."""
+    return len(fields(Remainder)) + (len(top_medium.ORDERS) if layout.apart else 0)
+
+
+def _of_numbers(layer: SlabValues) -> PhaseFunction:
+    """The phase function of a medium by the numbers that stand for any in code."""
+    return two_lobes(of_material.phase_of(layer))
+
+
+def _printed(layer: SlabValues) -> PhaseFunction:
+    """The phase function of a medium in code, which has no table of it but two lobes."""
+    phase = of_material.phase_of(layer)
+    return two_lobes(phase) if isinstance(phase, Tabulated) else phase
+
+
+def _of_top(material: Material, layout: Layout) -> list[float]:
+    """Numbers of the medium on top of a side: 1 where there is one, and its phase function as two lobes."""
+    if layout.top is None:
+        return [0.0] * OF_TOP
+    layer = material.layers[layout.top]
+    assert isinstance(layer, SlabValues)
+    lobes = two_lobes(of_material.phase_of(layer))
+    return [1.0, float(lobes.first.g), float(lobes.second.g), lobes.share]
+
+
+def _any_top(material: Material, top: TopMedium, flags: Iterator[Value]) -> TopMedium:
+    """A medium on top of any layout, on either side."""
+    is_on_top, first, second, share = islice(flags, OF_TOP)
+    slab = next(layer for layer in material.layers if isinstance(layer, SlabValues))
+    phase = TwoLobes(HenyeyGreenstein(first), HenyeyGreenstein(second), share)
+    top = TopMedium.of(slab, phase, top.shares)
+    return replace(top, albedo=is_on_top * top.albedo)
 
 
 def _placed(side: Side, rows: Array | None) -> tuple[Sequence[Group], Sequence[int | float]]:
@@ -283,6 +334,7 @@ class _WeighedSide(Side):
             rest * columns.rest,
             passes,
             None if columns.passed is None else through * columns.passed,
+            columns.of_top,
         )
 
 
@@ -298,7 +350,7 @@ def _rows(solver: Solver, found: Sequence[SolvedSide]) -> Array:
 
 
 def _colours(side: SolvedSide) -> Array:
-    return side.numbers.reshape(OF_POLYNOMIAL, -1)
+    return side.numbers.reshape(-1, side.polynomial.c_00.shape[-1])
 
 
 def _eventful(material: Material) -> Material:

@@ -15,20 +15,18 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from math import pi
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from velatura import ops
-from velatura.media.of_material import phase_of
 from velatura.model.solved.guards import COS_OF_DIRECTIONS_MIN
 from velatura.model.solved.lobes.remainder import Remainder, RemainderSamples, grazing
 from velatura.ops import Value
 from velatura.optics import ggx
 from velatura.optics.ggx import Direction
 from velatura.optics.phase import HenyeyGreenstein, PhaseFunction, deflect
-from velatura.stack import Material, SlabValues
+from velatura.stack import SlabValues
 
 Array = NDArray[np.floating]
 
@@ -38,29 +36,23 @@ MOST = 0.8  # of the samples of the remainder that are drawn by phase functions
 
 @dataclass(frozen=True)
 class TopMedium(ops.NamedFields):
-    """A medium by its albedo and optical depth, colours, its phase function and wider ones, with their shares, colours.
-
-    Samples are shared by `chances`, coefficients of 1, z and (1 - z)^4 for the cosine of the light.
-    """
+    """A medium by its albedo and optical depth, its phase function and wider ones, and their shares; all but phase
+    functions are colours."""
 
     albedo: Value
     depth: Value
     phase: PhaseFunction
-    wider: Sequence[PhaseFunction]
-    shares: Sequence[Value]
-    chances: Sequence[Value]
+    wider: tuple[PhaseFunction, ...]
+    shares: tuple[Value, ...]
 
     @classmethod
-    def of(cls, material: Material, place: int | None, shares: Any, chances: Any) -> TopMedium:
-        """The medium in a place of a material, in any dialect; where there is none, one that scatters nothing."""
-        if place is None:
-            nothing = HenyeyGreenstein(0.0)
-            return cls(0.0, 1.0, nothing, [nothing] * len(ORDERS), shares, chances)
-        layer = material.layers[place]
-        assert isinstance(layer, SlabValues)
+    def of(cls, layer: SlabValues | None, phase: PhaseFunction, shares: Sequence[Value]) -> TopMedium:
+        """A medium in any dialect; without one, one that scatters nothing."""
+        wider = tuple(HenyeyGreenstein(power(layer.g, n) if layer else 0.0) for n in ORDERS)
+        if layer is None:
+            return cls(0.0, 1.0, phase, wider, tuple(shares))
         depth = layer.tau_a + layer.tau_s
-        wider = [HenyeyGreenstein(power(layer.g, n)) for n in ORDERS]
-        return cls(ops.divide(layer.tau_s, depth), depth, phase_of(layer), wider, shares, chances)
+        return cls(ops.divide(layer.tau_s, depth), depth, phase, wider, tuple(shares))
 
     def value(self, wi: Direction, wo: Direction) -> Value:
         """f(wi, wo), a colour, of directions above."""
@@ -70,19 +62,15 @@ class TopMedium(ops.NamedFields):
             scattered = scattered + share * phase.density(cosine)
         return scattered * escaping(self.depth, wi[2], wo[2])  # model.md, Eq. 11
 
-    def chance(self, wi: Direction) -> Value:
-        """Share of samples that are drawn by phase functions."""
-        even, along, slanted = self.chances
-        return ops.clip(even + along * wi[2] + slanted * grazing(wi[2]), 0.0, MOST)
-
 
 @dataclass(frozen=True)
 class TopSamples(ops.NamedFields):
     """Samples of a remainder and of what the medium on top scatters back, half of these by its own phase function and
-    half by a wider one; what goes down is thrown back up."""
+    half by a wider one, `chance` being the share of both; what goes down is thrown back up."""
 
     rest: RemainderSamples
     top: TopMedium
+    chance: Value
 
     @property
     def drawn(self) -> tuple[PhaseFunction, PhaseFunction]:
@@ -91,14 +79,14 @@ class TopSamples(ops.NamedFields):
     def density(self, wi: Direction, wo: Direction) -> Value:
         """Density of `sample`, of directions above."""
         x, y, z = wo
-        chance = self.top.chance(wi)
         cosines = [-1 * ggx.dot(wi, w) for w in ((x, y, z), (x, y, -1 * z))]
         own, wider = (sum(map(phase.density, cosines)) for phase in self.drawn)
-        return (1 - chance) * self.rest.density(wi, wo) + ops.select(z > 0, 0.5 * chance * (own + wider), 0.0)
+        scattered = ops.select(z > 0, 0.5 * self.chance * (own + wider), 0.0)
+        return (1 - self.chance) * self.rest.density(wi, wo) + scattered
 
     def sample(self, wi: Direction, u: Value, u1: Value, u2: Value) -> Direction:
         """A direction wo from uniform numbers."""
-        chance = self.top.chance(wi)
+        chance = self.chance
         by_phase = u < chance
         x, y, z = self.rest.sample(wi, ops.clip(ops.divide(u - chance, 1 - chance), 0.0, 1.0), u1, u2)
         own, wider = (phase.sample(u1) for phase in self.drawn)
@@ -130,8 +118,13 @@ def value(rest: Remainder, top: TopMedium, wi: Direction, wo: Direction) -> Valu
     return ops.maximum(top.value(wi, wo) + rest.unclipped(wi, wo)[1] * (1 / pi), 0.0) * z
 
 
-def chances(cosines: Array, energy: Array, whole: Array) -> Array:
-    """Coefficients (3,) of `TopMedium.chance`, by energies (C, N) at some cosines, its own and all of the remainder."""
-    basis: Any = np.stack([np.ones_like(cosines), cosines, grazing(cosines)], axis=-1)
-    share = np.mean(energy, axis=0) / np.maximum(np.mean(whole, axis=0), ops.TINY)
-    return np.asarray(np.linalg.lstsq(basis, np.clip(share, 0, MOST), rcond=None)[0])
+def chances(cosines: Array, energy: Array, whole: Array, wanted: Array) -> Array:
+    """Share of samples (M,) that phase functions draw at the cosines `wanted` (M,), by energies (C, N) at some cosines:
+    that of the medium on top, and that of all of the remainder. It is smooth over the cosine."""
+    share = np.clip(np.mean(energy, axis=0) / np.maximum(np.mean(whole, axis=0), ops.TINY), 0, MOST)
+    numbers = np.linalg.lstsq(_basis(cosines), share, rcond=None)[0]
+    return np.asarray(np.clip(_basis(wanted) @ numbers, 0, MOST))
+
+
+def _basis(cosines: Array) -> Array:
+    return np.stack([np.ones_like(cosines), cosines, grazing(cosines)], axis=-1)
