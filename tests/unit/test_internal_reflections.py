@@ -101,7 +101,9 @@ def test_scattering_widens_until_it_is_diffuse() -> None:
     """By asymmetry, and by depth; a medium cut in four is the same, and none scatters nothing."""
 
     def found(stack: vt.Stack) -> Rest:
-        return internal_reflections.rest(passage_of(stack), at(0.8))
+        rest = internal_reflections.rest(passage_of(stack), at(0.8))
+        assert isinstance(rest, Rest)
+        return rest
 
     def alpha(stack: vt.Stack) -> float:
         lobe = found(stack).lobe

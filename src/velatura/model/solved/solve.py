@@ -6,6 +6,7 @@ import math
 from collections.abc import Callable, Iterator, Sequence, Set
 from dataclasses import dataclass, fields, replace
 from functools import cached_property
+from itertools import islice
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -28,8 +29,8 @@ from velatura.model.solved.grid import Folded, Grid, Listed
 from velatura.model.solved.guards import ALBEDO_MIN, COS_ON_GRID_MIN, ENERGY_EPS, WIDTH_ALPHA_MAX
 from velatura.model.solved.lobes import refracted_lobe, remainder, top_medium, widths
 from velatura.model.solved.lobes.refracted_lobe import MediumIndex
-from velatura.model.solved.lobes.remainder import Remainder, RemainderSamples
-from velatura.model.solved.lobes.top_medium import ORDERS, TopMedium, TopSamples
+from velatura.model.solved.lobes.remainder import EVEN, Remainder, RemainderSamples
+from velatura.model.solved.lobes.top_medium import ORDERS, Medium, PassedMedium, ScatteredThrough, TopMedium, TopSamples
 from velatura.model.solved.lobes.widths import Tensor
 from velatura.model.solved.sample_allocation import Demand
 from velatura.model.solved.transmission import combined, direct, internal_reflections
@@ -78,7 +79,8 @@ class LobeSpec:
 class Layout:
     """The lobes of a side, the interfaces that make a step of the index, the last one whose facets turn light, the
     slabs that scatter, by the number of interfaces above, and the indices of media that nodes are chosen for; the place
-    of a medium that scatters below no step of the index, None without one, and whether either side has such a one."""
+    of a medium that scatters below no step of the index, None without one, whether either side has such a one, and
+    whether it is alone."""
 
     lobes: list[LobeSpec]
     stepped: list[int]
@@ -87,21 +89,22 @@ class Layout:
     indices: list[float]
     top: int | None
     apart: bool
+    alone: bool
 
 
 @dataclass(frozen=True)
 class SolvedSide:
     """A side of a material in NumPy: columns (C, M) and (M,) over the directions of a grid; numbers of the remainder,
     (C,), and the albedo that it gains by being clipped at 0, (C, cosines); the shape of each lobe whose integral
-    has an edge between directions, else None; what passes, in a material that is drawn forward, else None; and where a
-    side has a medium on top, shares of its wider phase functions, (ORDERS, C)."""
+    has an edge between directions, else None; what passes, in a material that is drawn forward, else None; and of a
+    medium on top, shares of its wider phase functions, (K, C), with numbers and shares of what it passes alone."""
 
     columns: Columns
     polynomial: Remainder
     clipped: Array
     edged: Sequence[Shape | None]
     transmission: Transmission | None = None
-    top: Array | None = None
+    top: Sequence[Array] = ()
 
     @cached_property
     def rows(self) -> Array:
@@ -114,8 +117,8 @@ class SolvedSide:
 
     @property
     def numbers(self) -> Array:
-        """Those of the remainder, (8 C,), and after them those of a medium on top, (ORDERS C,)."""
-        return np.concatenate([*vars(self.polynomial).values(), *([] if self.top is None else self.top)])
+        """Those of the remainder, (8 C,), and after them those of a medium on top."""
+        return np.concatenate([*vars(self.polynomial).values(), *self.top])
 
     def weighed(self, factors: Sequence[Array], wanted: Demand) -> SolvedSide:
         """The side with weights of reflected parts, and of what passes, scaled by factors (C, M), and samples shared
@@ -159,6 +162,47 @@ class _Lobe(NamedTuple):
 
     shape: Shape
     tensor: Tensor
+
+
+@dataclass(frozen=True)
+class _Wide:
+    """Light over all directions: a polynomial of numbers (C, 1), and beside it what a medium scatters, with the share
+    of samples that it has at cosines (K,); None without one."""
+
+    polynomial: Remainder
+    medium: TopMedium | None = None
+    chance: Any = None
+
+    @classmethod
+    def fitted(
+        cls,
+        nodes: Nodes,
+        light: Array,
+        albedos: Array,
+        medium: TopMedium | None = None,
+        scattered: Sequence[Array] = (),
+        cosines: Any = None,
+    ) -> _Wide:
+        """Fit to light (C, modes, N, I) from `INCIDENCES`, of a material of these albedos (C, I). What the medium has
+        `scattered` once is known, and likewise light of its wider phase functions, whose shares are fitted, too."""
+        own, *others = scattered or (0.0,)
+        others = [np.broadcast_to(each, light.shape) for each in others]
+        numbers, shares = remainder.fit(nodes, light - own, INCIDENCES, albedos, others)
+        polynomial = Remainder(*(x[:, None] for x in vars(numbers).values()))
+        if medium is None:
+            return cls(polynomial)
+        energy = _energy(own + sum(share[:, None, None, None] * each for share, each in zip(shares, others)))
+        chance = top_medium.chances(INCIDENCES, energy, _energy(light), cosines)
+        return cls(polynomial, replace(medium, shares=tuple(shares[..., None])), chance)
+
+    @property
+    def numbers(self) -> list[Array]:
+        """Those of the polynomial, and shares of the medium."""
+        return [*vars(self.polynomial).values(), *(self.medium.shares if self.medium else ())]
+
+    def beside(self, medium: TopMedium, chance: Array) -> _Wide:
+        """The same polynomial beside a medium."""
+        return replace(self, medium=medium, chance=chance)
 
 
 class _Weighed(NamedTuple):
@@ -259,43 +303,35 @@ class Solver:
         return self.bsdf(material, made)
 
     def _in_numpy(self, material: Material, found: SolvedSide, layout: Layout, curves: Any) -> Side:
-        polynomial = Remainder(*(np.reshape(x, (-1, 1)) for x in vars(found.polynomial).values()))
-        top = None if found.top is None else self.top(material, layout, [*found.top[..., None]])
-        return self.side(material, layout, curves, polynomial, Context(colour=_stacked, tables=self.tables), top)
+        numbers = [*found.numbers.reshape(-1, self.colours, 1)]
+        return self.side(material, layout, curves, numbers, Context(colour=_stacked, tables=self.tables))
 
-    def side(
-        self,
-        material: Material,
-        layout: Layout,
-        curves: Any,
-        polynomial: Remainder,
-        context: Context,
-        top: TopMedium | None = None,
-    ) -> Side:
-        """A side of a material of a renderer's values, those of one point or of all."""
+    def side(self, material: Material, layout: Layout, curves: Any, numbers: Sequence[Value], context: Context) -> Side:
+        """A side of a material of a renderer's values, those of one point or of all; `numbers` are colours in the order
+        of `SolvedSide.numbers`."""
         assert context.colour is not None
-        shapes, samples = tuple(shapes_of(smooth_interfaces(material), layout.lobes)), polynomial.samples
+        shapes = tuple(shapes_of(smooth_interfaces(material), layout.lobes))
+        each = iter(numbers)
+        polynomial = _polynomial(each)
+        top = self.medium(TopMedium, material, layout, _shares(each)) if layout.apart else None
         transmission = self.transmission(material, layout)
+        if transmission and layout.alone:
+            passed = _polynomial(each)
+            through = ScatteredThrough(passed, self.medium(PassedMedium, material, layout, _shares(each)))
+            transmission = replace(transmission, through=through)
+        samples = polynomial.samples
         return Side(curves, shapes, polynomial, samples, transmission, context.colour, self.colours, self.kind, top)
 
-    def of_numbers(
-        self, material: Material, layout: Layout, curves: Any, numbers: Sequence[Value], context: Context
-    ) -> Side:
-        """A side of a material of a renderer's values, with colours in the order of `SolvedSide.numbers`."""
-        count = len(fields(Remainder))
-        top = self.top(material, layout, numbers[count:]) if layout.apart else None
-        return self.side(material, layout, curves, Remainder(*numbers[:count]), context, top)
-
-    def top(self, material: Material, layout: Layout, shares: Sequence[Value]) -> TopMedium:
+    def medium(self, kind: type[Medium], material: Material, layout: Layout, shares: Sequence[Value]) -> Medium:
         """The medium on top of a material in any dialect, with shares of its wider phase functions."""
         if layout.top is None:
-            return TopMedium.of(None, HenyeyGreenstein(0.0), shares)
+            return kind.of(None, HenyeyGreenstein(0.0), shares)
         layer = material.layers[layout.top]
         assert isinstance(layer, SlabValues)
-        return TopMedium.of(layer, self.phase_of(layer), shares)
+        return kind.of(layer, self.phase_of(layer), shares)
 
     def transmission(self, material: Material, layout: Layout) -> Transmission | None:
-        """What passes a material; None where nothing does."""
+        """What passes a material, but for what a medium alone scatters; None where nothing does."""
         if not material.transmits:
             return None
         return direct.transmission(material, self.variance, layout.stepped, layout.rough, layout.cloudy)
@@ -315,15 +351,15 @@ class Solver:
 
     def _side(self, material: Material, layout: Layout, folded: Folded | Listed) -> SolvedSide:
         """A side of a material at some directions, in the order of the physics."""
-        light, polynomial, top, of_top = self._light(material, layout, folded)
+        light, wide, through = self._light(material, layout, folded)
         lobes = self._lobes(material, layout, folded, light)
-        clipped, peak = _clipped(polynomial, top, of_top, folded.at_cosines)
-        whole = polynomial.albedo(folded.cosine) + folded.around(clipped)
+        clipped, peak = _clipped(wide, folded.at_cosines)
+        whole = wide.polynomial.albedo(folded.cosine) + folded.around(clipped)
         drawn, rest = self._hand_over(_in_veils(layout, material, light), folded, lobes, light.rest, whole)
         scale = _scale(rest, whole)
         wanted = [*(each.wanted for each in drawn), Demand.of(rest + ENERGY_EPS, rest, scale * folded.around(peak))]
         transmission = self.transmission(_uncoloured(material), layout)
-        shares, passes = self._allocate(material, layout, folded, light, wanted, transmission)
+        shares, passes = self._allocate(material, layout, folded, light, wanted, transmission, through)
         columns = Columns(
             [self._colours(each.weight) for each in drawn],
             [tuple(np.broadcast_to(x, folded.count) for x in self._roughness(lobe.tensor)) for lobe in lobes],
@@ -334,19 +370,20 @@ class Solver:
             self._colours(rest),
             passes,
             self._colours(light.passed) if passes else None,
-            None if of_top is None else folded.around(of_top),
+            None if wide.chance is None else folded.around(wide.chance),
         )
-        numbers = Remainder(*(np.broadcast_to(x[:, 0], self.colours) for x in vars(polynomial).values()))
+        count, numbers = len(fields(Remainder)), [number for each in (wide, through) if each for number in each.numbers]
+        numbers = [self._colours(each)[:, 0] for each in numbers]
         edged = self._edged(material, lobes, folded.phi)
         forward = transmission if self.model.form == "forward" else None
-        fitted = np.stack([self._colours(x)[:, 0] for x in top.shares]) if top else None
-        return SolvedSide(folded.unfolded(columns), numbers, self._colours(clipped), edged, forward, fitted)
+        polynomial, clipped = Remainder(*numbers[:count]), self._colours(clipped)
+        return SolvedSide(folded.unfolded(columns), polynomial, clipped, edged, forward, numbers[count:])
 
     def _light(
         self, material: Material, layout: Layout, folded: Folded | Listed
-    ) -> tuple[Energies, Remainder, TopMedium | None, Array | None]:
-        """Solve for the energies of all parts, and fit the remainder's polynomial beside what a medium on top scatters
-        back; with the share of samples that the medium has, at cosines."""
+    ) -> tuple[Energies, _Wide, _Wide | None]:
+        """Solve for the energies of all parts, and fit the remainder beside what a medium on top scatters back, and
+        what passes it where it is alone."""
         solved = energies(
             material,
             np.concatenate([folded.cosine, INCIDENCES]),
@@ -358,23 +395,19 @@ class Solver:
             events=layout.top is not None,
         )
         albedos = (solved.lobes.sum(axis=0) + solved.veils.sum(axis=0) + solved.rest)[:, folded.count :]
-        light, own, others = solved.remainder, None, []
-        grey = _uncoloured(material)
-        if layout.top is not None:
-            own, *others = _scattered_back(self.top(grey, layout, ()), solved.nodes)
-            light = light - own
-            others = [np.broadcast_to(each, light.shape) for each in others]
-        polynomial, shares = remainder.fit(solved.nodes, light, INCIDENCES, albedos, others)
-        top, of_top = None, None
-        if own is not None:
-            energy = (own + sum(share[:, None, None, None] * each for share, each in zip(shares, others)))[:, 0]
-            whole = solved.rest[:, folded.count :]
-            top = self.top(grey, layout, [*shares[..., None]])
-            of_top = top_medium.chances(INCIDENCES, energy.sum(axis=1), whole, folded.at_cosines[2])
-        elif layout.apart:
-            top, of_top = self.top(grey, layout, [np.zeros((1, 1))] * len(ORDERS)), 0 * folded.at_cosines[2]
-        found = Remainder(*(x[:, None] for x in vars(polynomial).values()))
-        return solved.first(folded.count), found, top, of_top
+        cosines, first = folded.at_cosines[2], solved.first(folded.count)
+        if not layout.apart:
+            return first, _Wide.fitted(solved.nodes, solved.remainder, albedos), None
+        grey, nothing = _uncoloured(material), [np.zeros((1, 1))] * len(ORDERS)
+        top = self.medium(TopMedium, grey, layout, nothing)
+        if layout.top is None:
+            return first, _Wide.fitted(solved.nodes, solved.remainder, albedos).beside(top, 0 * cosines), None
+        back, through = _scattered(top, solved.nodes, layout.alone)
+        wide = _Wide.fitted(solved.nodes, solved.remainder, albedos, top, back, cosines)
+        if not layout.alone:
+            return first, wide, None
+        passed = self.medium(PassedMedium, grey, layout, nothing)
+        return first, wide, _Wide.fitted(solved.nodes, solved.around, _energy(solved.around), passed, through, cosines)
 
     def _lobes(self, material: Material, layout: Layout, folded: Folded | Listed, light: Energies) -> list[_Lobe]:
         """Work out the widths of lobes and veils."""
@@ -414,6 +447,7 @@ class Solver:
         light: Energies,
         wanted: Sequence[Demand],
         transmission: Transmission | None,
+        through: _Wide | None,
     ) -> tuple[Array, Parts | None]:
         """Share samples among what is reflected, and what passes, which gets its weights."""
         # Light of a single isotropic interface is the same there and back
@@ -428,9 +462,24 @@ class Solver:
             facets = wanted[0]
             reflected = Demand(*(np.concatenate([0 * x[:1], x[1:]]) for x in reflected))
         met = [*(None if each.veil else each.interface for each in layout.lobes), None]
-        *diffuse, peak = folded.around(_passing(transmission, light, folded.at_cosines[2]))
-        energy = light.straight, light.bounced, light.passed
-        passes, shares = combined.parts(transmission, folded.directions, *energy, reflected, met, facets, diffuse, peak)
+        whole = None
+        if through:
+            gained, peak = map(folded.around, _clipped(through, folded.at_cosines))
+            whole = np.maximum(through.polynomial.albedo(folded.cosine) + gained, ALBEDO_MIN)
+            diffuse = [folded.around(through.chance), *(0 * folded.cosine for _ in EVEN[1:])]
+        else:
+            *diffuse, peak = folded.around(_passing(transmission, light, folded.at_cosines[2]))
+        passes, shares = combined.parts(
+            transmission,
+            folded.directions,
+            *(light.straight, light.bounced, light.passed),
+            reflected,
+            met,
+            facets,
+            diffuse,
+            peak,
+            whole,
+        )
         passes = _evenly(passes, least)
         return shares, replace(passes, **{name: self._colours(getattr(passes, name)) for name in Parts.COLOURS})
 
@@ -559,7 +608,7 @@ def solve(material: Material, model: Model, variance: type[Variance], context: C
         tables = [directional_grid.interleaved(next(flat), solver.shape, context.number) for _ in packing.tables]
         curves, column = packing.curves(tables), next(flat)
         numbers = column[:, None] if context.colour is channels else finite_differences.numbers(column, context.number)
-        made.append(solver.of_numbers(seen, layout, curves, coloured(numbers, solver, context), context))
+        made.append(solver.side(seen, layout, curves, coloured(numbers, solver, context), context))
     return solver.bsdf(material, made)
 
 
@@ -571,12 +620,31 @@ def coloured(numbers: Sequence[Value], solver: Solver, context: Context) -> list
     return [context.colour(*each[k : k + width]) for k in range(0, len(each), width)]
 
 
-def _scattered_back(top: TopMedium, nodes: Nodes) -> list[Array]:
+def _polynomial(numbers: Iterator[Value]) -> Remainder:
+    """The next of a side's numbers, as those of a polynomial."""
+    return Remainder(*islice(numbers, len(fields(Remainder))))
+
+
+def _shares(numbers: Iterator[Value]) -> list[Value]:
+    """And as shares of wider phase functions."""
+    return list(islice(numbers, len(ORDERS)))
+
+
+def _energy(light: Array) -> Array:
+    """Energies (C, I) of light (C, modes, N, I)."""
+    return np.asarray(light[:, 0].sum(axis=1))
+
+
+def _scattered(top: TopMedium, nodes: Nodes, through: bool) -> tuple[list[Array], list[Array]]:
     """Light (C, modes, N, I) that a medium scatters back once by its phase function, and by wider ones without loss,
-    from `INCIDENCES`."""
+    from `INCIDENCES`; and likewise what goes `through` it."""
     depth, basis, p = np.ravel(top.depth), Relative(nodes, tuple(range(MODES))), np.sqrt(1 - INCIDENCES**2)
-    own, *others = (escaped(phase, depth, basis, p) for phase in (top.phase, *top.wider))
-    return [np.reshape(top.albedo, (-1, 1, 1, 1)) * own, *others]
+    phases = enumerate((top.phase, *top.wider))
+    each = [escaped(phase, depth, basis, p, k if through else None) for k, phase in phases]
+    found = []
+    for own, *others in zip(*each):
+        found.append([np.reshape(top.albedo, (-1, 1, 1, 1)) * own, *others])
+    return found[0], found[1] if through else []
 
 
 def _stacked(*channels: Array) -> Array:
@@ -596,7 +664,14 @@ def layout_of(materials: Sequence[Material], veiled: Set[int] = frozenset()) -> 
     cloudy = sorted(set().union(*map(_cloudy, materials)))
     stepped = widths.stepped(steps)
     last, top = rough[-1] if rough else None, _top(materials, stepped)
-    return Layout(lobes, stepped, last, cloudy, media_of(materials[0]), top, top is not None)
+    alone = top is not None and not stepped and _has_one_medium(materials[0])
+    return Layout(lobes, stepped, last, cloudy, media_of(materials[0]), top, top is not None, alone)
+
+
+def _has_one_medium(material: Material) -> bool:
+    """Whether a material transmits, and has one medium and no films."""
+    slabs = sum(isinstance(layer, SlabValues) for layer in material.layers)
+    return material.transmits and slabs == 1 and not any(material.films)
 
 
 def _top(materials: Sequence[Material], stepped: Sequence[int]) -> int | None:
@@ -646,14 +721,14 @@ def _uncoloured(material: Material) -> Material:
     return material.each(lambda _, value: channels(value) if np.ndim(value) else value)
 
 
-def _clipped(polynomial: Remainder, top: TopMedium | None, of_top: Array | None, wi: Direction) -> tuple[Array, Array]:
-    """Albedo that a remainder of numbers (C, 1) gains by a medium on top, which has a share `of_top` (M,) of samples,
-    and by being clipped, and the largest weight of samples, (C, M)."""
-    numbers, top = direct.wider(polynomial), direct.wider(top)
+def _clipped(wide: _Wide, wi: Direction) -> tuple[Array, Array]:
+    """Albedo that a polynomial gains by a medium beside it, and by being clipped, and the largest weight of samples,
+    (C, M)."""
+    numbers, top = direct.wider(wide.polynomial), direct.wider(wide.medium)
     x, y, z = (each[:, None] for each in wi)
     samples: RemainderSamples | TopSamples = numbers.samples
-    if top and of_top is not None:
-        samples = TopSamples(numbers.samples, top, of_top[:, None])
+    if top:
+        samples = TopSamples(numbers.samples, top, wide.chance[:, None])
     # Not where it is sampled: directions of samples jump with the numbers
     cosine, turn = low_discrepancy.fibonacci(4 * EVENLY if top else EVENLY)
     sine, phi = np.sqrt(1 - cosine * cosine), 2 * np.pi * turn

@@ -91,7 +91,7 @@ class Spectra:
         for seen, layout, side in zip(sides(material), self.layouts, self.sides):
             curves = _OfRay(side, places, solver.colours)
             numbers = ops.interpolate(side.polynomial, places)
-            made.append(solver.of_numbers(seen, layout, curves, numbers, context))
+            made.append(solver.side(seen, layout, curves, numbers, context))
         return self.frame.turned(solver.bsdf(material, made), turned)
 
 

@@ -131,7 +131,7 @@ class TextureTables:
             found = [term.polynomials[k].at(*at) for term, at in zip(self.terms, places)]
             numbers = [sum(each[1:], each[0]) for each in zip(*found)]
             colours = solve.coloured(numbers, self.solver, self.context)
-            side = self.solver.of_numbers(seen, layout, curves, colours, self.context)
+            side = self.solver.side(seen, layout, curves, colours, self.context)
             made.append(_Interpolated(**vars(side), summed=len(self.terms) > 1))
         return self.solver.bsdf(material, made)
 

@@ -168,7 +168,7 @@ def tabulated(stack: Stack, material: Material, model: Model, variance: type[Var
     for k, (seen, layout) in enumerate(zip(solve.sides(material.solid()), layouts)):
         colours = [colour(f"{REMAINDER}[{of_side * k + j}]") for j in range(of_side)]
         context = replace(at_a_point(), colour=together)
-        side = solver.of_numbers(seen, layout, None, [*_colours(found[k])] if found else colours, context)
+        side = solver.side(seen, layout, None, [*_colours(found[k])] if found else colours, context)
         if general:
             side = replace(side, transmission=side.transmission and _any(side.transmission, flags))
             side = replace(side, top=side.top and _any_top(seen, side.top, flags))
@@ -235,12 +235,12 @@ def _any(transmission: Transmission, flags: Iterator[Value]) -> Transmission:
 
 def _of_kind(layout: Layout, kind: Layout) -> Layout:
     """The layout of a material with all that its kind draws, and nothing else."""
-    return replace(layout, lobes=kind.lobes, top=layout.top if kind.apart else None, apart=kind.apart)
+    return replace(layout, lobes=kind.lobes, top=layout.top if kind.apart else None, apart=kind.apart, alone=kind.alone)
 
 
 def _colours_of(layout: Layout) -> int:
-    """How many colours a side has, of its remainder and of a medium on top."""
-    return len(fields(Remainder)) + (len(top_medium.ORDERS) if layout.apart else 0)
+    """How many colours a side has: of its remainder and of a medium on top, and of what that passes alone."""
+    return (len(fields(Remainder)) + (len(top_medium.ORDERS) if layout.apart else 0)) * (1 + layout.alone)
 
 
 def _of_numbers(layer: SlabValues) -> PhaseFunction:

@@ -140,17 +140,21 @@ def _deflected(p: Value, psi: Value, cosine: Value, u_2: Value, n: Value) -> Dir
     return deflect(w, cosine, 2 * pi * u_2)
 
 
-def escaped(phase: PhaseFunction, depth: Array, basis: Basis, p: Array) -> Array:
+def escaped(phase: PhaseFunction, depth: Array, basis: Basis, p: Array, through: int | None = None) -> list[Array]:
     """Light (C, modes, N, S) that a medium of an optical depth (C,) scatters back once by a phase function, without
-    loss in an event, of one unit from outside of momenta p (S,)."""
-    numbers = [*depth.tolist()]
-    return basis.deposited(_escapes, p, np.zeros_like(p), _lattice(phase, True), numbers)[0][0]
+    loss in an event, of one unit from outside of momenta p (S,); and what it passes so, of the number of events that
+    `top_medium.passing` has in the place `through`, None for nothing."""
 
+    def escapes(
+        sources: Sequence[Value], samples: Sequence[Value], depths: Sequence[Value]
+    ) -> tuple[list[Light], list[Value]]:
+        (p, psi), (cosine, u_2, share) = sources, samples
+        x, y, z = _deflected(p, psi, cosine, u_2, 1.0)
+        up, down, z_i = ops.maximum(-1 * z, 0.0), ops.maximum(z, 0.0), ops.sqrt(1 - p * p)
+        lights = [Light(x, y, [share * up * top_medium.escaping(depth, z_i, up) for depth in depths])]
+        if through is not None:
+            passing = (top_medium.passing(depth, z_i, down)[through] for depth in depths)
+            lights.append(Light(x, y, [share * down * light for light in passing]))
+        return lights, []
 
-def _escapes(
-    sources: Sequence[Value], samples: Sequence[Value], depths: Sequence[Value]
-) -> tuple[list[Light], list[Value]]:
-    (p, psi), (cosine, u_2, share) = sources, samples
-    x, y, z = _deflected(p, psi, cosine, u_2, 1.0)
-    up, z_i = ops.maximum(-1 * z, 0.0), ops.sqrt(1 - p * p)
-    return [Light(x, y, [share * up * top_medium.escaping(depth, z_i, up) for depth in depths])], []
+    return basis.deposited(escapes, p, np.zeros_like(p), _lattice(phase, True), [*depth.tolist()])[0]

@@ -1,4 +1,4 @@
-"""Light that a medium scatters back where nothing above it refracts much: fog, dust, matt paint.
+"""Light that a medium scatters where nothing about it refracts much: fog, dust, matt paint.
 
 Of a homogeneous medium of optical depth tau and albedo a, with cosines z_i and z_o and the angle Theta between the
 directions of travel, light that is scattered once is reflected as (Chandrasekhar 1960)
@@ -8,13 +8,22 @@ directions of travel, light that is scattered once is reflected as (Chandrasekha
 Light that is scattered a few times keeps much of that form, by phase functions that are wider: the n-th of Henyey and
 Greenstein's with itself has the asymmetry g^n. So there are two more terms, of g^2 and g^4, whose shares are fitted to
 the nodes, and the remainder is what is left of that. All of it is reciprocal.
+
+A medium alone passes light, too. Small deflections hardly change slants, so that light which is scattered n times on
+its way passes as
+
+    f = C_n p_n(cos Theta) (P_n(tau / z_o) - P_n(tau / z_i)) / (n (z_i - z_o)),
+    P_n(x) = 1 - exp(-x) (1 + x + ... + x^(n-1) / (n-1)!),
+
+with C_1 = a exactly, and p_n of the asymmetry g^n; C_n is fitted likewise, beside a polynomial of its own.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from math import pi
+from math import factorial, pi, sqrt
+from typing import TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -29,8 +38,11 @@ from velatura.optics.phase import HenyeyGreenstein, PhaseFunction, deflect
 from velatura.stack import SlabValues
 
 Array = NDArray[np.floating]
+Medium = TypeVar("Medium", bound="TopMedium")
 
 ORDERS = 2, 4  # powers of the asymmetry
+NEAR = 1.0  # difference of two depths, within which a mean over it is by quadrature
+GAUSS = (0.5 - sqrt(0.15), 5 / 18), (0.5, 8 / 18), (0.5 + sqrt(0.15), 5 / 18)  # nodes and weights
 MOST = 0.8  # of the samples of the remainder that are drawn by phase functions
 
 
@@ -46,13 +58,18 @@ class TopMedium(ops.NamedFields):
     shares: tuple[Value, ...]
 
     @classmethod
-    def of(cls, layer: SlabValues | None, phase: PhaseFunction, shares: Sequence[Value]) -> TopMedium:
+    def of(cls: type[Medium], layer: SlabValues | None, phase: PhaseFunction, shares: Sequence[Value]) -> Medium:
         """A medium in any dialect; without one, one that scatters nothing."""
         wider = tuple(HenyeyGreenstein(power(layer.g, n) if layer else 0.0) for n in ORDERS)
         if layer is None:
             return cls(0.0, 1.0, phase, wider, tuple(shares))
         depth = layer.tau_a + layer.tau_s
         return cls(ops.divide(layer.tau_s, depth), depth, phase, wider, tuple(shares))
+
+    @property
+    def drawn(self) -> tuple[PhaseFunction, ...]:
+        """Phase functions that samples are drawn by, in equal shares."""
+        return self.phase, self.wider[0]
 
     def value(self, wi: Direction, wo: Direction) -> Value:
         """f(wi, wo), a colour, of directions above."""
@@ -63,25 +80,35 @@ class TopMedium(ops.NamedFields):
         return scattered * escaping(self.depth, wi[2], wo[2])  # model.md, Eq. 11
 
 
+class PassedMedium(TopMedium):
+    """A medium alone, by what it passes: directions below are turned up."""
+
+    @property
+    def drawn(self) -> tuple[PhaseFunction, ...]:
+        return self.phase, *self.wider
+
+    def value(self, wi: Direction, wo: Direction) -> Value:
+        cosine = wi[2] * wo[2] - wi[0] * wo[0] - wi[1] * wo[1]
+        terms = zip((self.albedo, *self.shares), (self.phase, *self.wider), passing(self.depth, wi[2], wo[2]))
+        first, *others = (share * phase.density(cosine) * light for share, phase, light in terms)
+        return sum(others, first)  # model.md, Eq. 12
+
+
 @dataclass(frozen=True)
 class TopSamples(ops.NamedFields):
-    """Samples of a remainder and of what the medium on top scatters back, half of these by its own phase function and
-    half by a wider one, `chance` being the share of both; what goes down is thrown back up."""
+    """Samples of a remainder and of what a medium scatters, by its own phase function and by wider ones, `chance` being
+    the share of all these; what goes down is thrown back up."""
 
     rest: RemainderSamples
     top: TopMedium
     chance: Value
 
-    @property
-    def drawn(self) -> tuple[PhaseFunction, PhaseFunction]:
-        return self.top.phase, self.top.wider[0]
-
     def density(self, wi: Direction, wo: Direction) -> Value:
         """Density of `sample`, of directions above."""
         x, y, z = wo
         cosines = [-1 * ggx.dot(wi, w) for w in ((x, y, z), (x, y, -1 * z))]
-        own, wider = (sum(map(phase.density, cosines)) for phase in self.drawn)
-        scattered = ops.select(z > 0, 0.5 * self.chance * (own + wider), 0.0)
+        first, *others = (phase.density(cosine) for phase in self.top.drawn for cosine in cosines)
+        scattered = ops.select(z > 0, self.chance * (1 / len(self.top.drawn)) * sum(others, first), 0.0)
         return (1 - self.chance) * self.rest.density(wi, wo) + scattered
 
     def sample(self, wi: Direction, u: Value, u1: Value, u2: Value) -> Direction:
@@ -89,19 +116,51 @@ class TopSamples(ops.NamedFields):
         chance = self.chance
         by_phase = u < chance
         x, y, z = self.rest.sample(wi, ops.clip(ops.divide(u - chance, 1 - chance), 0.0, 1.0), u1, u2)
-        own, wider = (phase.sample(u1) for phase in self.drawn)
-        cosine = ops.select(u < 0.5 * chance, own, wider)
+        *drawn, cosine = (phase.sample(u1) for phase in self.top.drawn)
+        count = len(drawn) + 1
+        for k in reversed(range(len(drawn))):
+            cosine = ops.select(u < chance * ((k + 1) / count), drawn[k], cosine)
         w = deflect((-1 * wi[0], -1 * wi[1], -1 * wi[2]), cosine, 2 * pi * u2)
-        drawn = zip((w[0], w[1], ops.absolute(w[2])), (x, y, z))
-        x, y, z = (ops.select(by_phase, a, b) for a, b in drawn)
+        either = zip((w[0], w[1], ops.absolute(w[2])), (x, y, z))
+        x, y, z = (ops.select(by_phase, a, b) for a, b in either)
         return x, y, z
 
 
-def power(g: Value, n: int) -> Value:
+@dataclass(frozen=True)
+class ScatteredThrough(ops.NamedFields):
+    """Light that a medium alone passes with events: a polynomial, and what is apart from it."""
+
+    polynomial: Remainder
+    medium: PassedMedium
+
+
+@dataclass(frozen=True)
+class PassedSamples:
+    """What a medium alone passes with events, from one direction, and samples of it; directions below are turned up."""
+
+    light: ScatteredThrough
+    samples: TopSamples
+
+    diffuse = 1.0
+
+    @classmethod
+    def of(cls, light: ScatteredThrough, chance: Value) -> PassedSamples:
+        chance = ops.clip(chance, 0.0, MOST)
+        return cls(light, TopSamples(light.polynomial.samples, light.medium, chance))
+
+    def eval_pdf(self, i: Direction, o: Direction) -> tuple[Value, Value]:
+        """f |cos theta_o|, a colour, and the density of `sample`."""
+        return value(self.light.polynomial, self.light.medium, i, o), self.samples.density(i, o)
+
+    def sample(self, i: Direction, u: Value, u1: Value, u2: Value) -> Direction:
+        return self.samples.sample(i, u, u1, u2)
+
+
+def power(x: Value, n: int) -> Value:
     """A whole power of a number of any sign."""
-    found = g
-    for _ in range(n - 1):
-        found = found * g
+    found: Value = 1.0
+    for k in range(n):
+        found = found * x if k else x
     return found
 
 
@@ -111,9 +170,38 @@ def escaping(depth: Value, z_i: Value, z_o: Value) -> Value:
     return (1 - ops.exp(-depth * (1 / z_i + 1 / z_o))) / (z_i + z_o)
 
 
+def passing(depth: Value, z_i: Value, z_o: Value) -> list[Value]:
+    """Light that passes a medium with one event, and with each number of `ORDERS`,
+    (P_n(tau / z_o) - P_n(tau / z_i)) / (n (z_i - z_o))."""
+    z_i, z_o = (ops.maximum(z, COS_OF_DIRECTIONS_MIN) for z in (z_i, z_o))
+    counts, x_i, x_o = (1, *ORDERS), depth / z_i, depth / z_o
+    # Where both are alike, by the mean over the depths between, of exp(-x) x^(n-1) / (n-1)!
+    near = ops.absolute(ops.mean(depth) * (z_i - z_o)) < NEAR * z_i * z_o
+    between = [(weight, x_o + u * (x_i - x_o)) for u, weight in GAUSS]
+    kept = [(weight * ops.exp(-x), x) for weight, x in between]
+    alike = depth / (z_i * z_o)
+    apart = 1 / ops.select(near, 1.0, z_i - z_o)
+    lost_i, lost_o = (ops.exp(-x) for x in (x_i, x_o))
+    found = []
+    for n in counts:
+        first, *others = (light * power(x, n - 1) for light, x in kept)
+        mean = sum(others, first) * (1 / factorial(n - 1))
+        difference = lost_i * _exponential(x_i, n) - lost_o * _exponential(x_o, n)
+        found.append(ops.select(near, alike * mean, apart * difference) * (1 / n))
+    return found
+
+
+def _exponential(x: Value, terms: int) -> Value:
+    """The first terms of the series of exp(x)."""
+    total: Value = 1.0
+    for k in range(terms - 1, 0, -1):
+        total = 1 + total * x * (1 / k)
+    return total
+
+
 def value(rest: Remainder, top: TopMedium, wi: Direction, wo: Direction) -> Value:
-    """f(wi, wo) |cos theta_o| of a remainder and of what the medium on top scatters back, a colour; 0 unless both are
-    above the surface."""
+    """f(wi, wo) |cos theta_o| of a remainder and of what a medium scatters, a colour; 0 unless both are above the
+    surface."""
     z = ops.select(wi[2] > 0, ops.maximum(wo[2], 0.0), 0.0)
     return ops.maximum(top.value(wi, wo) + rest.unclipped(wi, wo)[1] * (1 / pi), 0.0) * z
 

@@ -80,6 +80,7 @@ def parts(
     facets: Demand | None = None,
     numbers: Sequence[Array] = (),
     peak: Array | float = 1.0,
+    whole: Array | None = None,
 ) -> tuple[Parts, Array]:
     """Parts in NumPy, for directions wi above, (N,) each, and energies (C, N): of light that passes directly, and
     after bounces, where it meets facets once and is not scattered; of all that passes.
@@ -87,7 +88,7 @@ def parts(
     What is `reflected` has the other samples, in shares (K, N). Those that do not pass the facets of an interface are
     as those of its lobe: `met` numbers the interface of each part, None of those that are no lobe. The `facets` of a
     single interface have no others. Diffuse light has the `numbers` of `remainder.passing`, and samples of a weight up
-    to `peak`.
+    to `peak`. The integral of scattered light is `whole`, where it is known.
     """
     i, lobe, found = (
         internal_reflections.seen_below(transmission, wi),
@@ -106,7 +107,7 @@ def parts(
     weight_bounced = np.minimum(ops.divide(bounces, of_bounced), MAX_GAIN) * bool(lobe)
     energies = weight_straight * of_straight, weight_bounced * of_bounced
     rest = np.maximum(passed - energies[0] - energies[1], 0)
-    weight_rest = rest / internal_reflections.integral_rest(found, i)
+    weight_rest = rest / (internal_reflections.integral_rest(found, i) if whole is None else whole)
     # Share samples; of the facets that are drawn, some reflect
     straightly, bouncing, scattered = energies[0], energies[1], rest
     if lobe:

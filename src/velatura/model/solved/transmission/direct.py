@@ -50,6 +50,7 @@ from velatura.model.solved.guards import (
     MOMENTUM_WIDTH_MIN,
     WIDTH2_MIN,
 )
+from velatura.model.solved.lobes.top_medium import ScatteredThrough
 from velatura.model.variance import Covariance, Isotropic, Roughness, Variance
 from velatura.ops import Value
 from velatura.optics import fresnel, ggx
@@ -124,6 +125,7 @@ class Transmission:
 
     Of interfaces, `faces` are 1 for the last two that make a step of the index, or for the only one, else 0; `under`
     are 1 from the last of them on; `scattered` are 1 below the last medium that scatters, or the last rough interface.
+    What a medium alone scatters is light `through` it, None elsewhere.
     """
 
     refractions: tuple[Refraction, ...]
@@ -133,6 +135,7 @@ class Transmission:
     scattered: tuple[Value, ...]
     bounces: bool
     is_cloudy: bool
+    through: ScatteredThrough | None = None
 
     @property
     def indices(self) -> list[Value]:

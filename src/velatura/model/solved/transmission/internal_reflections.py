@@ -31,6 +31,7 @@ from velatura.model.solved.guards import COS_INSIDE_MIN, COS_OUTSIDE_MIN, G_MIN,
 from velatura.model.solved.lobes import refracted_lobe, remainder
 from velatura.model.solved.lobes.refracted_lobe import RefractedLobe
 from velatura.model.solved.lobes.remainder import EVEN, RemainderSamples
+from velatura.model.solved.lobes.top_medium import PassedSamples
 from velatura.model.solved.transmission.direct import (
     WIDTHS,
     CrossedSlab,
@@ -93,8 +94,11 @@ def bound(transmission: Transmission) -> Value:
     )
 
 
-def rest(transmission: Transmission, wi: Direction, numbers: Sequence[Value] = EVEN) -> Rest:
-    """The light from wi, above, that is scattered by media, or often by facets; diffuse light has `numbers`."""
+def rest(transmission: Transmission, wi: Direction, numbers: Sequence[Value] = EVEN) -> Rest | PassedSamples:
+    """The light from wi, above, that is scattered by media, or often by facets; diffuse light has `numbers`, whose
+    first is of a medium alone the share of samples by phase functions."""
+    if transmission.through:
+        return PassedSamples.of(transmission.through, numbers[0])
     reached = bound(transmission) / transmission.indices[-1]
     if not transmission.is_cloudy:
         return Rest(None, 1.0, reached, numbers)
@@ -173,8 +177,10 @@ def seen_below(transmission: Transmission, wi: Direction) -> Direction:
     return x, y, ops.maximum(ops.sqrt(1 - x * x - y * y), COS_INSIDE_MIN)
 
 
-def eval_pdf_rest(found: Rest, i: Direction, o: Direction) -> tuple[Value, Value]:
+def eval_pdf_rest(found: Rest | PassedSamples, i: Direction, o: Direction) -> tuple[Value, Value]:
     """f |cos theta_o|, a colour, and the density of `sample_rest`, in the frame of `seen_below`."""
+    if isinstance(found, PassedSamples):
+        return found.eval_pdf(i, o)
     within = found.within(o)
     even = found.diffuse * ops.maximum(o[2], 0.0) / (found.bound * found.bound)
     value = ops.select(within[2] > 0, even * (1 / pi) * diffuse(found.numbers, i, within), 0.0)
@@ -185,8 +191,10 @@ def eval_pdf_rest(found: Rest, i: Direction, o: Direction) -> tuple[Value, Value
     return value, density
 
 
-def sample_rest(found: Rest, i: Direction, u: Value, u1: Value, u2: Value) -> Direction:
+def sample_rest(found: Rest | PassedSamples, i: Direction, u: Value, u1: Value, u2: Value) -> Direction:
     """A direction, in the frame of `seen_below`, from uniform numbers."""
+    if isinstance(found, PassedSamples):
+        return found.sample(i, u, u1, u2)
     even = found.samples.sample(i, ops.clip(ops.divide(u, found.diffuse), 0.0, 1.0), u1, u2)
     x, y = found.bound * even[0], found.bound * even[1]
     even = x, y, ops.sqrt(1 - x * x - y * y)
@@ -206,8 +214,9 @@ def diffuse(numbers: Sequence[Value], i: Direction, o: Direction) -> Value:
     return ops.maximum(mean + once * s + twice * (2 * s * s - both), 0.0)  # model.md, Eq. 10
 
 
-def integral_rest(found: Rest, i: tuple[Array, Array, Array]) -> Array:
+def integral_rest(found: Rest | PassedSamples, i: tuple[Array, Array, Array]) -> Array:
     """Energy (3, N) of `eval_pdf_rest` from directions (N,) each."""
+    assert isinstance(found, Rest)
     if not found.lobe:
         return np.ones((1, len(i[2])))
     return np.asarray((1 - found.diffuse) * refracted_lobe.integral(found.lobe, i) + found.diffuse)
