@@ -56,6 +56,7 @@ MANY = 4  # interfaces or lobes, beyond which each has fewer samples
 FINELY = 1597, 4181  # facets, and as NORMALS, for differences, whose error is that of values over a step
 BETWEEN = {True: 144, False: 89}  # as NORMALS, for each place of a renderer's grid
 NARROW = 0.05  # roughness of lobes whose integrals have edges between directions, as those of interfaces do
+SLANTED = np.concatenate([[0.12], INCIDENCES])
 EVENLY = 377  # directions over which the remainder is integrated, and four times as many with a medium on top
 BRIGHTEST = 4.0  # by how much it is scaled at most
 LITTLE = 0.05  # by which energies are scaled for their colour
@@ -177,32 +178,29 @@ class _Wide:
     def fitted(
         cls,
         nodes: Nodes,
+        incidences: Array,
         light: Array,
         albedos: Array,
         medium: TopMedium | None = None,
         scattered: Sequence[Array] = (),
         cosines: Any = None,
     ) -> _Wide:
-        """Fit to light (C, modes, N, I) from `INCIDENCES`, of a material of these albedos (C, I). What the medium has
-        `scattered` once is known, and likewise light of its wider phase functions, whose shares are fitted, too."""
+        """Fit to light (C, modes, N, I) from cosines `incidences`, of a material of these albedos (C, I). What the
+        medium has `scattered` once is known, and so is light of its wider phase functions, whose shares are fitted."""
         own, *others = scattered or (0.0,)
         others = [np.broadcast_to(each, light.shape) for each in others]
-        numbers, shares = remainder.fit(nodes, light - own, INCIDENCES, albedos, others)
+        numbers, shares = remainder.fit(nodes, light - own, incidences, albedos, others)
         polynomial = Remainder(*(x[:, None] for x in vars(numbers).values()))
         if medium is None:
             return cls(polynomial)
         energy = _energy(own + sum(share[:, None, None, None] * each for share, each in zip(shares, others)))
-        chance = top_medium.chances(INCIDENCES, energy, _energy(light), cosines)
+        chance = top_medium.chances(incidences, energy, _energy(light), cosines)
         return cls(polynomial, replace(medium, shares=tuple(shares[..., None])), chance)
 
     @property
     def numbers(self) -> list[Array]:
         """Those of the polynomial, and shares of the medium."""
         return [*vars(self.polynomial).values(), *(self.medium.shares if self.medium else ())]
-
-    def beside(self, medium: TopMedium, chance: Array) -> _Wide:
-        """The same polynomial beside a medium."""
-        return replace(self, medium=medium, chance=chance)
 
 
 class _Weighed(NamedTuple):
@@ -384,30 +382,33 @@ class Solver:
     ) -> tuple[Energies, _Wide, _Wide | None]:
         """Solve for the energies of all parts, and fit the remainder beside what a medium on top scatters back, and
         what passes it where it is alone."""
+        incidences = _incidences(layout)
         solved = energies(
             material,
-            np.concatenate([folded.cosine, INCIDENCES]),
-            np.concatenate([folded.phi, 0 * INCIDENCES]),
+            np.concatenate([folded.cosine, incidences]),
+            np.concatenate([folded.phi, 0 * incidences]),
             self.tables if self.model.microsurface else None,
             widths.nearly_straight,
+            incidences,
             samples=self.normals or (FINELY[0] if self.finely else SAMPLES),
             like=layout.indices,
             events=layout.top is not None,
         )
         albedos = (solved.lobes.sum(axis=0) + solved.veils.sum(axis=0) + solved.rest)[:, folded.count :]
-        cosines, first = folded.at_cosines[2], solved.first(folded.count)
+        seen, cosines = (solved.nodes, incidences), folded.at_cosines[2]
+        first, reflected = solved.first(folded.count), (solved.remainder, albedos)
         if not layout.apart:
-            return first, _Wide.fitted(solved.nodes, solved.remainder, albedos), None
+            return first, _Wide.fitted(*seen, *reflected), None
         grey, nothing = _uncoloured(material), [np.zeros((1, 1))] * len(ORDERS)
         top = self.medium(TopMedium, grey, layout, nothing)
         if layout.top is None:
-            return first, _Wide.fitted(solved.nodes, solved.remainder, albedos).beside(top, 0 * cosines), None
+            return first, replace(_Wide.fitted(*seen, *reflected), medium=top, chance=0 * cosines), None
         back, through = _scattered(top, solved.nodes, layout.alone)
-        wide = _Wide.fitted(solved.nodes, solved.remainder, albedos, top, back, cosines)
+        wide = _Wide.fitted(*seen, *reflected, top, back, cosines)
         if not layout.alone:
             return first, wide, None
-        passed = self.medium(PassedMedium, grey, layout, nothing)
-        return first, wide, _Wide.fitted(solved.nodes, solved.around, _energy(solved.around), passed, through, cosines)
+        passed, medium = (solved.around, _energy(solved.around)), self.medium(PassedMedium, grey, layout, nothing)
+        return first, wide, _Wide.fitted(*seen, *passed, medium, through, cosines)
 
     def _lobes(self, material: Material, layout: Layout, folded: Folded | Listed, light: Energies) -> list[_Lobe]:
         """Work out the widths of lobes and veils."""
@@ -468,7 +469,7 @@ class Solver:
             whole = np.maximum(through.polynomial.albedo(folded.cosine) + gained, ALBEDO_MIN)
             diffuse = [folded.around(through.chance), *(0 * folded.cosine for _ in EVEN[1:])]
         else:
-            *diffuse, peak = folded.around(_passing(transmission, light, folded.at_cosines[2]))
+            *diffuse, peak = folded.around(_passing(transmission, layout, light, folded.at_cosines[2]))
         passes, shares = combined.parts(
             transmission,
             folded.directions,
@@ -620,6 +621,11 @@ def coloured(numbers: Sequence[Value], solver: Solver, context: Context) -> list
     return [context.colour(*each[k : k + width]) for k in range(0, len(each), width)]
 
 
+def _incidences(layout: Layout) -> Array:
+    """Cosines at which wide light is known: that of a medium on top has a shape at slants, too."""
+    return INCIDENCES if layout.top is None else SLANTED
+
+
 def _polynomial(numbers: Iterator[Value]) -> Remainder:
     """The next of a side's numbers, as those of a polynomial."""
     return Remainder(*islice(numbers, len(fields(Remainder))))
@@ -637,8 +643,8 @@ def _energy(light: Array) -> Array:
 
 def _scattered(top: TopMedium, nodes: Nodes, through: bool) -> tuple[list[Array], list[Array]]:
     """Light (C, modes, N, I) that a medium scatters back once by its phase function, and by wider ones without loss,
-    from `INCIDENCES`; and likewise what goes `through` it."""
-    depth, basis, p = np.ravel(top.depth), Relative(nodes, tuple(range(MODES))), np.sqrt(1 - INCIDENCES**2)
+    from cosines `SLANTED`; and likewise what goes `through` it."""
+    depth, basis, p = np.ravel(top.depth), Relative(nodes, tuple(range(MODES))), np.sqrt(1 - SLANTED**2)
     phases = enumerate((top.phase, *top.wider))
     each = [escaped(phase, depth, basis, p, k if through else None) for k, phase in phases]
     found = []
@@ -738,10 +744,11 @@ def _clipped(wide: _Wide, wi: Direction) -> tuple[Array, Array]:
     return 2 * np.pi * gained.mean(axis=-1), ops.divide(value, samples.density((x, y, z), wo)).max(axis=-1)
 
 
-def _passing(transmission: Transmission, solved: Energies, cosines: Array) -> Array:
+def _passing(transmission: Transmission, layout: Layout, solved: Energies, cosines: Array) -> Array:
     """Numbers of light from directions wi that passes neither straight nor after bounces, and the largest weight of its
     samples, (6, M)."""
-    wi = _of_cosines(INCIDENCES)
+    incidences = _incidences(layout)
+    wi = _of_cosines(incidences)
     light = np.mean(
         solved.around - internal_reflections.share(internal_reflections.bounced(transmission, wi)) * solved.again,
         axis=0,
@@ -750,7 +757,7 @@ def _passing(transmission: Transmission, solved: Energies, cosines: Array) -> Ar
     at_incidences = remainder.passing(
         solved.nodes, light, float(ops.mean(internal_reflections.bound(transmission))), sines
     )
-    numbers = np.array([np.interp(cosines, INCIDENCES, each) for each in at_incidences])
+    numbers = np.array([np.interp(cosines, incidences, each) for each in at_incidences])
     o = low_discrepancy.fibonacci(EVENLY)
     radius, phi = np.sqrt(o[0]), 2 * np.pi * o[1]
     i = internal_reflections.seen_below(transmission, _of_cosines(cosines[:, None]))
