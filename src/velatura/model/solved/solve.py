@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterator, Sequence, Set
 from dataclasses import dataclass, fields, replace
-from functools import cached_property
+from functools import cached_property, partial
 from itertools import islice
 from typing import Any, NamedTuple
 
@@ -57,7 +57,7 @@ FINELY = 1597, 4181  # facets, and as NORMALS, for differences, whose error is t
 BETWEEN = {True: 144, False: 89}  # as NORMALS, for each place of a renderer's grid
 NARROW = 0.05  # roughness of lobes whose integrals have edges between directions, as those of interfaces do
 SLANTED = np.concatenate([[0.12], INCIDENCES])
-EVENLY = 377  # directions over which the remainder is integrated, and four times as many with a medium on top
+EVENLY = 377  # directions over which the remainder is integrated, and for each phase function of a medium on top
 BRIGHTEST = 4.0  # by how much it is scaled at most
 LITTLE = 0.05  # by which energies are scaled for their colour
 BRIGHTER = 1.5  # at most, where it takes light of lobes
@@ -732,16 +732,18 @@ def _clipped(wide: _Wide, wi: Direction) -> tuple[Array, Array]:
     (C, M)."""
     numbers, top = direct.wider(wide.polynomial), direct.wider(wide.medium)
     x, y, z = (each[:, None] for each in wi)
+    # Not where it is sampled: directions of samples jump with the numbers
+    cosine, turn = low_discrepancy.fibonacci(EVENLY)
+    sine, phi = np.sqrt(1 - cosine * cosine), 2 * np.pi * turn
+    wo: Direction = (sine * np.cos(phi), sine * np.sin(phi), cosine)
     samples: RemainderSamples | TopSamples = numbers.samples
+    value, density = numbers.value, np.full(EVENLY, 1 / (2 * np.pi))
     if top:
         samples = TopSamples(numbers.samples, top, wide.chance[:, None])
-    # Not where it is sampled: directions of samples jump with the numbers
-    cosine, turn = low_discrepancy.fibonacci(4 * EVENLY if top else EVENLY)
-    sine, phi = np.sqrt(1 - cosine * cosine), 2 * np.pi * turn
-    wo = sine * np.cos(phi), sine * np.sin(phi), cosine
-    value = top_medium.value(numbers, top, (x, y, z), wo) if top else numbers.value((x, y, z), wo)
-    gained = value - numbers.unclipped((x, y, z), wo)[1] * (cosine / np.pi)
-    return 2 * np.pi * gained.mean(axis=-1), ops.divide(value, samples.density((x, y, z), wo)).max(axis=-1)
+        value, (wo, density) = partial(top_medium.value, numbers, top), top.lattice((x, y, z), wo, cosine, turn)
+    light = value((x, y, z), wo)
+    gained = (light - numbers.unclipped((x, y, z), wo)[1] * (wo[2] / np.pi)) / density
+    return gained.mean(axis=-1), ops.divide(light, samples.density((x, y, z), wo)).max(axis=-1)
 
 
 def _passing(transmission: Transmission, layout: Layout, solved: Energies, cosines: Array) -> Array:

@@ -30,8 +30,8 @@ Straight = Callable[[PhaseFunction], float]  # share of scattered light that cou
 
 THIN = 1e-4  # depth of the first layer, which scatters once at most: errors go as this depth
 EVENTS = 600
-FINE_EVENTS = 2500  # where the shape of light counts, and of these
-EVEN = 0.25  # in all directions alike, where few are drawn by a phase function with a peak
+FINE_EVENTS = 1597  # where the shape of light counts, and of these
+EVEN = 0.4  # in all directions alike, where few are drawn by a phase function with a peak
 HORIZON = 0.005  # cosine of directions that lie on both sides in part
 
 

@@ -71,6 +71,24 @@ class TopMedium(ops.NamedFields):
         """Phase functions that samples are drawn by, in equal shares."""
         return self.phase, self.wider[0]
 
+    def lattice(self, wi: Direction, even: Direction, u1: Array, u2: Array) -> tuple[Direction, Array]:
+        """Directions wo above in NumPy, (M, K), `even` ones (N,) and as many by each phase function, and the density of
+        them all; those change smoothly with wi, (M, 1) each."""
+        folded = [even]
+        for phase in self.drawn:
+            x, y, z = deflect((-1 * wi[0], -1 * wi[1], -1 * wi[2]), phase.sample(u1), 2 * pi * u2)
+            folded.append((x, y, np.abs(z)))
+        shape = len(wi[2]), len(u1)
+        x, y, z = (np.concatenate([np.broadcast_to(each, shape) for each in w], axis=1) for w in zip(*folded))
+        scattered = sum(self.densities(wi, (x, y, z)))
+        return (x, y, z), (1 / (2 * pi) + scattered) / len(folded)
+
+    def densities(self, wi: Direction, wo: Direction) -> list[Value]:
+        """Densities of light that phase functions draw, folded up, in directions wo above."""
+        x, y, z = wo
+        cosines = [-1 * ggx.dot(wi, w) for w in ((x, y, z), (x, y, -1 * z))]
+        return [phase.density(cosine) for phase in self.drawn for cosine in cosines]
+
     def value(self, wi: Direction, wo: Direction) -> Value:
         """f(wi, wo), a colour, of directions above."""
         cosine = -1 * ggx.dot(wi, wo)
@@ -105,10 +123,8 @@ class TopSamples(ops.NamedFields):
 
     def density(self, wi: Direction, wo: Direction) -> Value:
         """Density of `sample`, of directions above."""
-        x, y, z = wo
-        cosines = [-1 * ggx.dot(wi, w) for w in ((x, y, z), (x, y, -1 * z))]
-        first, *others = (phase.density(cosine) for phase in self.top.drawn for cosine in cosines)
-        scattered = ops.select(z > 0, self.chance * (1 / len(self.top.drawn)) * sum(others, first), 0.0)
+        first, *others = self.top.densities(wi, wo)
+        scattered = ops.select(wo[2] > 0, self.chance * (1 / len(self.top.drawn)) * sum(others, first), 0.0)
         return (1 - self.chance) * self.rest.density(wi, wo) + scattered
 
     def sample(self, wi: Direction, u: Value, u1: Value, u2: Value) -> Direction:
