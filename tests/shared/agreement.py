@@ -57,6 +57,7 @@ SEQUENCES: tuple[tuple[Kind, ...], ...] = (
     (D, D, D, C),
     (L,),
     (S, L),
+    (S, D),
 )
 #: How the roughnesses of the interfaces lie: the same along both axes, along the frame's axes, turned.
 SHAPES = ("round", "straight", "turned")

@@ -182,6 +182,23 @@ def test_a_flat_spectrum_is_a_number(form: str) -> None:
     np.testing.assert_allclose(one[1], other[1], rtol=1e-5)
 
 
+@pytest.mark.parametrize("form", ("forward", "symmetric"))
+@pytest.mark.parametrize("below", ({"layer1_eta": 1.0}, {"layer1_eta": 0.3, "layer1_k": 3.0, "layer1_alpha": 0.3}))
+def test_a_medium_on_top_of_a_flat_spectrum_is_that_of_a_number(below: dict[str, float], form: str) -> None:
+    """To rounding: reflected and passed, as in RGB variants."""
+    flat = {"type": "regular", "wavelength_min": 360, "wavelength_max": 830, "values": "0.9, 0.9"}
+    fog = {"type": "layered", "layer0_depth": 0.5, "layer0_sigma_a": 0.1, "layer0_g": 0.7, **below, "form": form}
+    for wo in (WO, (*WO[:2], -WO[2])):
+        one, other = (
+            kernel.load_dict(fog | {"layer0_sigma_s": each}).eval(mi.BSDFContext(), seen(WI, RAYS[0]), towards(wo))
+            for each in (flat, 0.9)
+        )
+        np.testing.assert_allclose(np.ravel(one), np.ravel(other), rtol=1e-5)
+        np.testing.assert_allclose(
+            np.ravel(one)[:3], in_rgb(fog | {"layer0_sigma_s": 0.9}, WI, wo), rtol=1e-4, atol=1e-6
+        )
+
+
 @pytest.mark.parametrize("name", ("bare-gold", "varnished-paint"))
 def test_what_is_sampled_once_is_what_every_ray_would_find(name: str) -> None:
     """Energies over direction and wavelength within 1 %; the diffuse base's means as well."""

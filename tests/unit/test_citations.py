@@ -94,6 +94,7 @@ MODEL = {
     9: ("direct transmission", {"transmission/direct"}),
     10: ("diffuse transmission", {"transmission/internal_reflections"}),
     11: ("medium on top", {"lobes/top_medium"}),
+    12: ("light through a medium alone", {"lobes/top_medium"}),
 }
 
 

@@ -2,18 +2,20 @@
 
 from __future__ import annotations
 
-from math import pi
+from math import factorial, pi
 from typing import Any
 
 import numpy as np
 import pytest
 
+from velatura.media.of_material import phase_of, two_lobes
 from velatura.model import named
 from velatura.model.context import Context
 from velatura.model.solved import solve
 from velatura.model.solved.bsdf import Solved
+from velatura.model.solved.lobes import top_medium
 from velatura.model.variance import variance_kind
-from velatura.stack import Diffuse, Film, Interface, Material, Medium, Stack
+from velatura.stack import Diffuse, Film, Interface, Material, Medium, SlabValues, Stack
 
 METAL = Interface(eta=0.2, k=3.0, alpha=0.2)
 TURN = np.linspace(0, 2 * pi, 9)[:-1]
@@ -43,11 +45,37 @@ def test_a_thin_dark_medium_scatters_once(g: float) -> None:
         np.testing.assert_allclose(found.eval_pdf(wi, wo)[0][0] / z_o, once, rtol=0.05, atol=0.02 * once.max())
 
 
+@pytest.mark.parametrize("g", [-0.4, 0.0, 0.6, 0.9])
+def test_a_thin_dark_medium_alone_passes_what_it_scatters_once(g: float) -> None:
+    """Expected: the closed form, as above; equal slants are its limit."""
+    albedo, depth = 0.02, 0.05
+    found = body([Medium(depth=depth, sigma_s=albedo, sigma_a=1 - albedo, g=g), Interface(eta=1.0)])
+    for z_i, z_o in ((0.8, 0.9), (0.3, 0.5), (0.5, 0.2), (0.6, 0.6 + 1e-9)):
+        wi, (x, y, z) = directions(z_i, 0 * TURN), directions(z_o, TURN[1:-1] + 0.2)
+        wi = wi[0][1:-1], wi[1][1:-1], wi[2][1:-1]
+        cosine = -(wi[0] * x + wi[1] * y) + wi[2] * z
+        phase = (1 - g * g) / (4 * pi * (1 + g * g - 2 * g * cosine) ** 1.5)
+        once = albedo * phase * (np.exp(-depth / z_o) - np.exp(-depth / z_i)) / (z_o - z_i)
+        np.testing.assert_allclose(found.eval_pdf(wi, (x, y, -z))[0][0] / z_o, once, rtol=0.05, atol=0.02 * once.max())
+
+
+@pytest.mark.parametrize("n", [1, 2, 4])
+@pytest.mark.parametrize("slants", [(0.3, 0.8), (0.5, 0.51), (0.7, 0.7), (0.05, 0.9)])
+def test_depths_between_slants(n: int, slants: tuple[float, float]) -> None:
+    """Expected: the quadrature of exp(-x) x^(n-1) / (n-1)! over the depths between those of both slants, over n."""
+    depth, (z_i, z_o) = 1.3, slants
+    u, weights = np.polynomial.legendre.leggauss(200)
+    x = depth / z_o + (0.5 + 0.5 * u) * (depth / z_i - depth / z_o)
+    mean = 0.5 * np.sum(weights * np.exp(-x) * x ** (n - 1)) / factorial(n - 1)
+    found = top_medium.passing(depth, z_i, z_o)[[1, *top_medium.ORDERS].index(n)]
+    assert found == pytest.approx(depth / (z_i * z_o) * mean / n, rel=1e-5)
+
+
 @pytest.mark.parametrize("form", ["forward", "symmetric"])
 @pytest.mark.parametrize("below", [[Interface(eta=1.0)], [Diffuse(albedo=0.4)], [METAL]], ids=["fog", "base", "metal"])
 def test_samples_have_the_values_over_their_density(below: list[Any], form: str) -> None:
     """Expected: their mean weight is the energy, within 4.5 standard errors (a false alarm in 150 000, 24 of them) and
-    what the light of a lobe at the horizon loses; none is heavier than 2.9."""
+    what the light of a lobe at the horizon loses; none is heavier than 2.9. Fog passes light, too."""
     found = body([Medium(sigma_s=(0.9, 0.7, 0.5), sigma_a=0.1, g=0.8), *below], form)
     u = np.random.default_rng(7).random((3, 20_000))
     for cosine in (0.9, 0.2):
@@ -119,3 +147,33 @@ def test_a_medium_seen_through_its_other_side_is_apart_on_one_side_alone() -> No
     found = body([Medium(depth=0.3, sigma_s=1.0, g=0.6), Interface(eta=1.5), Interface(eta=1.0)])
     assert found.below and found.above.top and found.below.top
     assert np.max(found.above.top.albedo) == 1 and np.max(found.below.top.albedo) == 0
+
+
+@pytest.mark.parametrize(
+    ("layers", "alone"),
+    [
+        ([Medium(sigma_s=1.0), Interface(eta=1.0)], True),
+        ([Interface(eta=1.0), Medium(sigma_s=1.0), Interface(eta=1.0, alpha=0.3)], True),
+        ([Medium(sigma_s=1.0), Interface(eta=1.2)], False),
+        ([Medium(sigma_s=1.0), Medium(sigma_a=1.0), Interface(eta=1.0)], False),
+        ([Medium(sigma_s=1.0), Diffuse(albedo=0.5)], False),
+        ([Medium(sigma_a=1.0), Interface(eta=1.0)], False),
+    ],
+)
+def test_a_medium_is_alone_without_steps_of_the_index(layers: list[Any], alone: bool) -> None:
+    assert solve.layout_of([Material.of(Stack(layers))]).alone == alone
+
+
+@pytest.mark.parametrize("phase", ["rayleigh", {"table": [(0, 3), (60, 0.3), (90, 0.1), (180, 0.2)]}])
+def test_two_lobes_have_the_moments_of_a_phase_function(phase: Any) -> None:
+    """Expected: the first three, or two of one that falls off as no lobe does, by quadrature of the densities."""
+    layer = Material.of(Stack([Medium(sigma_s=1.0, phase=phase), METAL])).layers[0]
+    assert isinstance(layer, SlabValues)
+    own = phase_of(layer)
+    x, weights = np.polynomial.legendre.leggauss(2000)
+    for order in (1, 2, 3) if phase == "rayleigh" else (1, 2):
+        moments = [
+            2 * pi * np.sum(weights * f.density(x) * np.polynomial.legendre.legval(x, [0] * order + [1]))
+            for f in (own, two_lobes(own))
+        ]
+        assert moments[1] == pytest.approx(moments[0], abs=2e-4)

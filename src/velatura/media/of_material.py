@@ -29,23 +29,25 @@ def phase_of(layer: SlabValues) -> PhaseFunction:
 
 
 def two_lobes(phase: PhaseFunction) -> TwoLobes:
-    """Two lobes with the first three moments of a phase function of numbers, or one of its asymmetry where its second
-    moment is less than that asks for."""
+    """Two lobes with the first three moments of a phase function of numbers. Of one that has none such, a lobe and even
+    scattering with the first two, or a lobe of its asymmetry."""
     if isinstance(phase, TwoLobes):
         return phase
     if isinstance(phase, HenyeyGreenstein):
         return TwoLobes(phase, phase, 1.0)
     cosine = phase.sample((np.arange(DRAWN) + 0.5) / DRAWN)
     first, second, third = (float(np.mean(x)) for x in _legendre(cosine))
-    spread = second - first * first
-    if spread < SPREAD_MIN:
-        only = HenyeyGreenstein(first)
-        return TwoLobes(only, only, 1.0)
-    # The asymmetries are the nodes of Gauss's quadrature of these moments
+    spread = max(second - first * first, SPREAD_MIN)
+    # Asymmetries are the nodes of Gauss's quadrature of these moments
     half, product = 0.5 * (third - first * second) / spread, (first * third - second * second) / spread
-    root = np.sqrt(half * half - product)
-    forward, backward = (float(np.clip(half + x, -G_MAX, G_MAX)) for x in (root, -root))
-    return TwoLobes(HenyeyGreenstein(forward), HenyeyGreenstein(backward), (first - backward) / (forward - backward))
+    root = float(np.sqrt(max(half * half - product, SPREAD_MIN)))
+    nodes = half + root, half - root
+    if second <= first * first or max(map(abs, nodes)) > G_MAX:
+        widest = second <= first * first or second > G_MAX * abs(first)
+        nodes = (first, 0.0) if widest else (second / first, 0.0)
+    forward, backward = nodes
+    share = (first - backward) / (forward - backward) if forward != backward else 1.0
+    return TwoLobes(HenyeyGreenstein(forward), HenyeyGreenstein(backward), share)
 
 
 def _legendre(x: Array) -> tuple[Array, Array, Array]:

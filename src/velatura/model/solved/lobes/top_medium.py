@@ -80,8 +80,7 @@ class TopMedium(ops.NamedFields):
             folded.append((x, y, np.abs(z)))
         shape = len(wi[2]), len(u1)
         x, y, z = (np.concatenate([np.broadcast_to(each, shape) for each in w], axis=1) for w in zip(*folded))
-        scattered = sum(self.densities(wi, (x, y, z)))
-        return (x, y, z), (1 / (2 * pi) + scattered) / len(folded)
+        return (x, y, z), np.sum([*self.densities(wi, (x, y, z)), 0 * z + 1 / (2 * pi)], axis=0) / len(folded)
 
     def densities(self, wi: Direction, wo: Direction) -> list[Value]:
         """Densities of light that phase functions draw, folded up, in directions wo above."""
