@@ -10,6 +10,7 @@ import velatura as vt
 from velatura import ops
 from velatura.model.rough_interface import KEPT
 from velatura.renderer import compiled
+from velatura.renderer.compiled import Deposit, Found
 from velatura.renderer.kept import Kept
 
 
@@ -23,9 +24,11 @@ class Wave:
         return self.size * ops.cos(x)
 
 
-def function(sources: Any, samples: Any, numbers: Any) -> Any:
+def function(sources: Any, samples: Any, numbers: Any) -> Found:
     (p,), (u,), (wave, at, shift, one) = sources, samples, numbers
-    return [[at(p * u) + shift, one * p], [u]], [wave.colour * p * u, ops.log_gamma(1 + u)]
+    first = ops.floor(p * u * (ROWS - 3)) - 1
+    light = Deposit(first, [p, u, 0.5 * p, 0.25 * u], [p, at(p * u), u], [1.0, p])
+    return Found([wave.colour * p * u, ops.log_gamma(1 + u)], [at(p * u) + shift, one * p], [light])
 
 
 def numbers(where: object = None) -> Any:
@@ -35,23 +38,39 @@ def numbers(where: object = None) -> Any:
 
 def by_kernels(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(compiled, "MANY", -1)
+    monkeypatch.setattr(compiled, "MANY_DEPOSITED", -1)
     monkeypatch.setattr(compiled, "LEAST", 0)
 
 
+ROWS = 9
 SOURCES = [np.linspace(0.1, 1.0, 7)]
 SAMPLES = [np.linspace(0.0, 1.0, 5)]
 
 
 def test_kernels_and_numpy_agree(monkeypatch: pytest.MonkeyPatch) -> None:
-    groups, sums = compiled.over(function, SOURCES, SAMPLES, numbers())
-    by_kernels(monkeypatch)
-    compiled_groups, compiled_sums = compiled.over(function, SOURCES, SAMPLES, numbers())
-    assert [x.shape for x in groups] == [(7, 5, 2), (7, 5, 1)] and sums.shape == (4, 7)
-    for plain, kernel in zip([*groups, sums], [*compiled_groups, compiled_sums]):
-        assert kernel == pytest.approx(plain, abs=1e-12)
-    product = SOURCES[0][:, None] * SAMPLES[0]
-    assert groups[0][..., 0] == pytest.approx(0.7 * np.cos(product) + 0.25, abs=1e-15)
+    for count in (7, 64, 1):
+        sources = [np.linspace(0.1, 1.0, count)]
+        sums, largest, (light,) = compiled.over(function, sources, SAMPLES, numbers(), ROWS)
+        with monkeypatch.context() as patched:
+            by_kernels(patched)
+            found = compiled.over(function, sources, SAMPLES, numbers(), ROWS)
+        assert sums.shape == (4, count) and largest.shape == (2, count) and light.shape == (3, 2, ROWS + 1, count)
+        for plain, kernel in zip([sums, largest, light], [*found[:2], *found[2]]):
+            assert kernel == pytest.approx(plain, abs=1e-12)
+    product = sources[0][:, None] * SAMPLES[0]
+    assert largest[0] == pytest.approx((0.7 * np.cos(product) + 0.25).max(axis=1), abs=1e-15)
     assert sums[2] == pytest.approx(0.9 * product.sum(axis=1), abs=1e-14)
+
+
+def test_light_falls_on_its_rows() -> None:
+    _, _, (light,) = compiled.over(function, SOURCES, SAMPLES, numbers(), ROWS)
+    wanted = np.zeros((ROWS + 1, len(SOURCES[0])))
+    for k, p in enumerate(SOURCES[0]):
+        for u in SAMPLES[0]:
+            first = int(np.floor(p * u * (ROWS - 3))) - 1
+            for j, share in enumerate((p, u, 0.5 * p, 0.25 * u)):
+                wanted[first + j, k] += share * u * p  # number -1 is the last one
+    assert light[2, 1] == pytest.approx(wanted, abs=1e-14)
 
 
 def test_objects_that_no_kernel_reads_run_by_numpy(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -60,8 +79,8 @@ def test_objects_that_no_kernel_reads_run_by_numpy(monkeypatch: pytest.MonkeyPat
 
     by_kernels(monkeypatch)
     monkeypatch.setattr(compiled, "_compiled", refused)
-    groups, _ = compiled.over(function, SOURCES, SAMPLES, numbers(object()))
-    assert groups[0].shape == (7, 5, 2)
+    sums, _, _ = compiled.over(function, SOURCES, SAMPLES, numbers(object()), ROWS)
+    assert sums.shape == (4, 7)
 
 
 def test_another_number_or_address_needs_no_other_kernel(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -71,7 +90,7 @@ def test_another_number_or_address_needs_no_other_kernel(monkeypatch: pytest.Mon
         held = np.empty(16 + SOURCES[0].size)[place : place + SOURCES[0].size]
         held[:] = SOURCES[0]
         with dr.scoped_set_flag(dr.JitFlag.KernelHistory, True):
-            compiled.over(function, [held], SAMPLES, [*numbers()[:2], shift, 1.0])
+            compiled.over(function, [held], SAMPLES, [*numbers()[:2], shift, 1.0], ROWS)
             return {each["hash"] for each in dr.kernel_history([dr.KernelType.JIT])}
 
     vt.bsdf(vt.load("coated-gold"))
@@ -84,7 +103,10 @@ def test_lobes_are_the_same_by_numpy_and_by_kernels(monkeypatch: pytest.MonkeyPa
     stacks = [vt.load(name) for name in ("coated-gold", "pearl-lacquer", "frosted-glass")]
     found = []
     for kernels in (False, True):
-        by_kernels(monkeypatch) if kernels else monkeypatch.setattr(compiled, "MANY", 1 << 60)
+        if kernels:
+            by_kernels(monkeypatch)
+        else:
+            monkeypatch.setattr(compiled, "LEAST", 1 << 60)
         KEPT.clear()
         lobes = [vt.lobes(stack, [1.0, 0.5, 0.1], 0.3) for stack in stacks]
         found.append([(each.energy, each.alpha) for each in lobes])

@@ -23,6 +23,7 @@ from velatura.ops import Value
 from velatura.optics import fresnel, ggx, refraction
 from velatura.optics.ggx import Direction
 from velatura.renderer import compiled
+from velatura.renderer.compiled import Found, Varying
 from velatura.renderer.kept import Kept
 from velatura.renderer.low_discrepancy import STEPS, fibonacci
 from velatura.stack import InterfaceValues
@@ -201,12 +202,12 @@ class FirstShares:
         lengths, places = np.unique(p, return_inverse=True)
         events = FirstEvents(facets, (often,), again)
 
-        def totals(*values: Any) -> tuple[list[list[Value]], list[Value]]:
+        def totals(*values: Any) -> Found:
             lights, others = events(*values)
-            return [], [*(weight for light in lights for weight in light.weights), *others]
+            return Found([*(weight for light in lights for weight in light.weights), *others])
 
         of_lengths = lengths, 0 * lengths
-        _, found = compiled.over(totals, of_lengths, fibonacci(samples), events.numbers(samples))
+        found, _, _ = compiled.over(totals, of_lengths, fibonacci(samples), events.numbers(samples), kind=events.kind)
         count = events.lights * events.colours
         lights = found[:count, places].reshape(events.lights, events.colours, len(p))
         return cls.beside(facets, [*lights], found[count:, places])
@@ -248,7 +249,13 @@ class FirstEvents:
         first = self.facets.outcomes
         return first + (first * first if self.again else 0)
 
-    def numbers(self, samples: int) -> list[Any]:
+    @property
+    def kind(self) -> Hashable:
+        """All that is no number."""
+        facets = self.facets
+        return FirstEvents, facets.opaque, facets.below is None, self.colours, self.ways, self.again
+
+    def numbers(self, samples: int) -> tuple[Any, ...]:
         """All numbers, and films, as `__call__` reads them."""
         facets, n = self.facets, float(ops.mean(self.facets.above))
         alpha = max(facets.alpha_u, ALPHA_MIN), max(facets.alpha_v, ALPHA_MIN)
@@ -258,26 +265,20 @@ class FirstEvents:
         eta = 1.0 if facets.opaque or facets.below is None else float(ops.mean(facets.below)) / n
         indices = (np.broadcast_to(x / facets.above, self.colours) for x in (facets.below, facets.k) if x is not None)
         straight = facets.straight(self.ways[-1])
-        return [
-            n,
-            *alpha,
-            turns,
-            eta,
-            straight,
-            1 / len(fibonacci(samples)[0]),
-            *np.concatenate([*indices, []]),
-            facets.films,
-        ]
+        share = 1 / len(fibonacci(samples)[0])
+        found = n, *alpha, turns, eta, straight, share, *np.concatenate([*indices, []])
+        return Varying(found), facets.films
 
     def __call__(
-        self, sources: Sequence[Value], samples: Sequence[Value], numbers: Sequence[Value]
+        self, sources: Sequence[Value], samples: Sequence[Value], numbers: Any
     ) -> tuple[list[Light], list[Value]]:
         """Events of light of momenta of length p at azimuths psi, in the frame of the interface's axes.
 
         Momenta are of the direction of travel, which a mirror leaves alone.
         """
         (p, psi), (u_1, u_2) = sources, samples
-        n, alpha_u, alpha_v, turns, eta, straight, share, *colours, _ = numbers
+        values, _ = numbers
+        n, alpha_u, alpha_v, turns, eta, straight, share, *colours = values
         alpha = alpha_u, alpha_v
         sin = ops.minimum(p / n, SIN_AT_FACETS_MAX)
         # Light comes from wi, and travels to -wi
@@ -290,7 +291,7 @@ class FirstEvents:
         lights = [Light(n * o[0], n * o[1], [r * share * each for each in kept for r in reflectance])]
         blocked = 1 - kept[-1]
         others = [r * share * blocked for r in reflectance]
-        again, twice = self._second(o, others, u_2 / share, numbers) if self.again else ([], [])
+        again, twice = self._second(o, others, u_2 / share, values) if self.again else ([], [])
         if not self.facets.opaque:
             x, y, z = refraction.refract_at(wi, h, cosine, eta)
             through = []
@@ -303,7 +304,7 @@ class FirstEvents:
             if self.again:
                 # What meets facets from below is seen upside down
                 inside = [ops.select(z < 0, each, 0.0) for each in others[len(passing) :]]
-                turned = below, alpha_u, alpha_v, 0.0, 1 / eta, 0.0, 0.0, *(1 / index for index in colours), None
+                turned = below, alpha_u, alpha_v, 0.0, 1 / eta, 0.0, 0.0, *(1 / index for index in colours)
                 from_below = replace(self, facets=self.facets.reversed())
                 again += from_below._second((x, y, -1 * z), inside, u_2 / share, turned)[0]
         return [*lights, *again], [*others, blocked * share, *twice]
@@ -313,7 +314,7 @@ class FirstEvents:
     ) -> tuple[list[Light], list[Value]]:
         """Light of samples of running numbers that has been reflected, upwards or downwards, and meets another facet:
         reflected past others, and refracted; and all that is reflected."""
-        n, alpha_u, alpha_v, _, eta, _, _, *colours, _ = numbers
+        n, alpha_u, alpha_v, _, eta, _, _, *colours = numbers
         u_3, u_4 = (number * step - ops.floor(number * step) for step in STEPS)
         wi = -travels[0], -travels[1], -travels[2]
         h = ggx.sample_visible(wi, alpha_u, alpha_v, u_3, u_4)

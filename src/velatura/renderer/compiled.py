@@ -1,8 +1,8 @@
 """Functions of every source and every sample: by NumPy, and compiled by Dr.Jit in a process that asks for many.
 
-A function is written on `velatura.ops`. NumPy begins at once; Dr.Jit takes a tenth of a second for each kind of
-function, and then a third of NumPy's time. So a kernel follows once `MANY` values of its kind have been worked out
-without it.
+A function is written on `velatura.ops`. NumPy begins at once; Dr.Jit takes some hundredths of a second for each kind of
+function, and then a tenth of NumPy's time: a loop over the samples, whose sums never leave the processor. So a kernel
+follows once so many values of its kind have been worked out without it.
 """
 
 from __future__ import annotations
@@ -10,33 +10,61 @@ from __future__ import annotations
 import copy
 import functools
 import itertools
-from collections import Counter
+from collections import Counter, OrderedDict
 from collections.abc import Callable, Hashable, Sequence
-from dataclasses import fields, is_dataclass
+from dataclasses import dataclass, fields, is_dataclass
+from threading import Lock
 from types import MethodType
-from typing import Any, cast
+from typing import Any, NamedTuple, cast
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.sparse import csc_array
 
 from velatura import kernel
 from velatura.ops import Value
-from velatura.renderer.packets import aligned
+from velatura.renderer.packets import WIDTH, aligned
 
 Array = NDArray[Any]
-Groups = Sequence[Sequence[Value]]
 
-#: Of sources, samples and numbers: groups of values, and values that are summed up over the samples
-Function = Callable[[Sequence[Value], Sequence[Value], Any], tuple[Groups, Sequence[Value]]]
-
-MANY = 500_000  # values of a kind, about as long as a kernel of it takes to compile
-LEAST = 15_000  # values at a time: for fewer, a kernel takes longer to describe than NumPy to run
+MANY = 100_000  # values of a kind, about as long as a kernel of it takes to compile
+MANY_DEPOSITED = 400_000  # likewise of kinds with light that falls on rows, whose kernels are longer
+LEAST = 2_000  # values at a time: for fewer, a kernel takes longer to launch than NumPy to run
 BLOCK = 1 << 15  # values at a time, which a processor's cache holds
-COMPILED_BLOCK = 1 << 18
-REDUCED_BLOCK = 1 << 16  # of values that are reduced at once: larger arrays are new pages each time
 COLOURS = 3
+KERNELS = 64  # kinds whose launches are kept
+SIZES = 16  # of each: which numbers of sources, samples and rows are alike
 
 _asked: Counter[Hashable] = Counter()  # values so far, by kind
+_kernels: OrderedDict[Hashable, Any] = OrderedDict()
+_launching = Lock()
+
+
+class Deposit(NamedTuple):
+    """Light that falls on rows: its `values` times `waves`, shared among the rows from the one of number `first` on.
+    What is before the first row falls on one beyond the last."""
+
+    first: Value
+    shares: Sequence[Value]
+    values: Sequence[Value]
+    waves: Sequence[Value]
+
+
+class Found(NamedTuple):
+    """What a function has for sources and samples: values that are summed up over the samples, values of which the
+    largest is wanted, and light that falls on rows."""
+
+    sums: Sequence[Value] = ()
+    largest: Sequence[Value] = ()
+    deposits: Sequence[Deposit] = ()
+
+
+class Varying(tuple[Value, ...]):
+    """Numbers that do not belong to the kind of a function, whatever they are."""
+
+
+#: Of sources, samples and numbers
+Function = Callable[[Sequence[Value], Sequence[Value], Any], Found]
 
 
 def over(
@@ -44,36 +72,32 @@ def over(
     sources: Sequence[Array],
     samples: Sequence[Array],
     numbers: Any,
-    reduced: Callable[[list[Array]], list[Array]] | None = None,
-) -> tuple[list[Array], Array]:
-    """Values of a function of each source (S,) and each sample (N,), or its own (S, N): of each group of K values
-    (S, N, K), and sums over the samples (L, S).
+    rows: int = 0,
+    kind: Hashable = (),
+) -> tuple[Array, Array, list[Array]]:
+    """What a function finds for each source (S,) over all samples (N,), or its own (S, N): sums (L, S), the largest
+    (G, S), and of each light what falls on `rows`, and on the one beyond: (values, waves, rows + 1, S).
 
     `numbers` are a list, a tuple or a record: of others, of numbers, and of colours (3, 1, ...). What is no number, and
-    0.0 and 1.0, belong to the kind of function. It runs by NumPy alone if other objects are among them. `reduced` makes
-    arrays (..., S) of the groups of some sources at a time, which are what is returned.
+    0.0 and 1.0 but for those that are `Varying`, belong to the kind of function, as does all else that it depends on,
+    `kind`. It runs by NumPy alone if other objects are among them.
     """
-    count = samples[0].shape[-1]
-    module = None
-    if len(sources[0]) * count > LEAST and not _foreign(numbers):
-        kind = function.__module__, function.__qualname__, *(x.ndim for x in samples), _kind(numbers)
-        module = kernel.llvm() if _asked[kind] > MANY else None
-        _asked[kind] += 0 if module else len(sources[0]) * count
-    compiled_block = REDUCED_BLOCK if reduced else COMPILED_BLOCK
-    size = max((compiled_block if module else BLOCK) // count, 1)
+    count, width = samples[0].shape[-1], len(sources[0])
+    kernels = None
+    if width * count > LEAST and not _foreign(numbers):
+        kind = function.__module__, function.__qualname__, kind, *(x.ndim for x in samples), _kind(numbers)
+        kernels = kernel.llvm() if _asked[kind] >= (MANY_DEPOSITED if rows else MANY) else None
+        _asked[kind] += 0 if kernels else width * count
+    if kernels:
+        return _compiled(kernels, kind, function, sources, samples, numbers, rows)
+    size = max(BLOCK // count, 1)
     found = []
-    for first in range(0, max(len(sources[0]), 1), size):
+    for first in range(0, max(width, 1), size):
         some, own = [x[first : first + size] for x in sources], [_part(x, first, size) for x in samples]
-        if module is None:
-            values, sums = _plain(function, some, own, numbers)
-        else:
-            values, sums = _compiled(module, function, some, own, numbers)
-        found.append((reduced(values) if reduced else values, sums))
-    groups, totals = zip(*found)
-    if len(found) == 1:
-        return groups[0], totals[0]
-    axis = -1 if reduced else 0
-    return [np.concatenate(each, axis=axis) for each in zip(*groups)], np.concatenate(totals, axis=-1)
+        found.append(_plain(function, some, own, numbers, rows))
+    sums, largest, deposits = zip(*found)
+    lights = [np.concatenate(each, axis=-1) for each in zip(*deposits)]
+    return np.concatenate(sums, axis=-1), np.concatenate(largest, axis=-1), lights
 
 
 def _part(samples: Array, first: int, size: int) -> Array:
@@ -81,64 +105,146 @@ def _part(samples: Array, first: int, size: int) -> Array:
 
 
 def _plain(
-    function: Function, sources: Sequence[Array], samples: Sequence[Array], numbers: Any
-) -> tuple[list[Array], Array]:
-    groups, sums = function([x[:, None] for x in sources], samples, numbers)
+    function: Function, sources: Sequence[Array], samples: Sequence[Array], numbers: Any, rows: int
+) -> tuple[Array, Array, list[Array]]:
+    found = function([x[:, None] for x in sources], samples, numbers)
     shape = len(sources[0]), samples[0].shape[-1]
-    found = []
-    for group in map(_channels, groups):
-        each = np.empty((*shape, len(group)))
-        for k, value in enumerate(group):
-            each[..., k] = value
-        found.append(each)
-    return found, np.array([np.broadcast_to(value, shape).sum(axis=1) for value in _channels(sums)])
+
+    def each(values: Sequence[Value]) -> list[Array]:
+        return [np.broadcast_to(value, shape) for value in _channels(values)]
+
+    sums = _rows([value.sum(axis=1) for value in each(found.sums)], shape[0])
+    largest = _rows([value.max(axis=1) for value in each(found.largest)], shape[0])
+    return sums, largest, [_deposited(each, shape, rows) for each in found.deposits]
+
+
+def _rows(each: Sequence[Array], width: int) -> Array:
+    """Rows of that width, or none."""
+    return np.array(each) if each else np.zeros((0, width))
+
+
+def _deposited(light: Deposit, shape: tuple[int, int], rows: int) -> Array:
+    """What falls on rows, samples being columns of a sparse matrix."""
+    shares, values, waves = (
+        np.stack(np.broadcast_arrays(*each, np.empty(shape))[:-1], axis=-1)
+        for each in (light.shares, light.values, light.waves)
+    )
+    first, source = np.asarray(light.first).astype(np.int32), np.arange(shape[0], dtype=np.int32)[:, None]
+    steps = np.int32(shape[0]) * np.arange(shares.shape[-1], dtype=np.int32)
+    places = (first * np.int32(shape[0]) + source)[..., None] + steps
+    places[..., 0] += np.where(first < 0, np.int32((rows + 1) * shape[0]), 0)
+    entries = shares.ravel(), places.ravel(), np.arange(0, shares.size + 1, shares.shape[-1], dtype=np.int32)
+    each = (values[..., :, None] * waves[..., None, :]).reshape(shape[0] * shape[1], values.shape[-1] * waves.shape[-1])
+    found = csc_array(entries, ((rows + 1) * shape[0], len(each))) @ each
+    return found.T.reshape(values.shape[-1], waves.shape[-1], rows + 1, shape[0])
+
+
+@dataclass(frozen=True)
+class _Kernel:
+    """A frozen function of Dr.Jit, and of each light how many values, times waves, it deposits."""
+
+    launch: Any
+    lights: list[tuple[int, int]]
 
 
 def _compiled(
-    module: Any, function: Function, sources: Sequence[Array], samples: Sequence[Array], numbers: Any
-) -> tuple[list[Array], Array]:
+    module: Any,
+    kind: Hashable,
+    function: Function,
+    sources: Sequence[Array],
+    samples: Sequence[Array],
+    numbers: Any,
+    rows: int,
+) -> tuple[Array, Array, list[Array]]:
     """One kernel for all values: numbers are read from an array, so that others need no kernel of their own."""
     import drjit as dr
 
-    number, integer = module.Float64, module.UInt32
-
     def array(values: Any) -> Any:
         # Arrays at other addresses would have a kernel of their own
-        return number(aligned(np.ravel(values), np.float64))
+        return module.Float64(aligned(np.ravel(values), np.float64))
 
-    shape = len(sources[0]), samples[0].shape[-1]
-    flat: list[float] = []
+    width = len(sources[0])
+    flat: list[float] = [0.0]
     _mapped(numbers, flat.append)
-    given = array([*flat, 0.0])
+    sizes = module.UInt32(aligned(np.array([width, samples[0].shape[-1], rows]), np.uint32))
+    # Sources of a sample lie side by side
+    given = [array(x) for x in sources], [array(x.T if x.ndim > 1 else x) for x in samples], array(flat), sizes
+    with _launching:
+        if kind not in _kernels:
+            _kernels[kind] = _kernel(module, function, sources, samples, numbers, rows)
+            if len(_kernels) > KERNELS:
+                _kernels.popitem(last=False)
+        _kernels.move_to_end(kind)
+        of_kind = _kernels[kind]
+        outs = [
+            [dr.opaque(module.Float64, 0.0, (rows + 1) * width * part) for _, part in _packets(count)]
+            for count in (values * waves for values, waves in of_kind.lights)
+        ]
+        sums, largest, outs = of_kind.launch(_numbered(module.UInt32, width), *given, outs)
+        totals, greatest = (_rows([np.broadcast_to(x.numpy(), width) for x in each], width) for each in (sums, largest))
+        lights = []
+        for (values, waves), parts in zip(of_kind.lights, outs):
+            each = [x.numpy().reshape(rows + 1, width, -1) for x in parts]
+            found = np.concatenate(each, axis=-1)[..., : values * waves]
+            lights.append(np.moveaxis(found, -1, 0).reshape(values, waves, rows + 1, width))
+    return totals, greatest, lights
 
-    def read(values: Any, place: Any) -> Any:
-        return dr.gather(number, values, place)
 
-    source, sample = _places(integer, *shape)
-    places = itertools.count()
-    groups, sums = function(
-        [read(array(x), source) for x in sources],
-        [array(x) if x.ndim > 1 else read(array(x), sample) for x in samples],
-        _mapped(numbers, lambda _: read(given, integer(next(places))), module.Array3f64),
-    )
-    size = shape[0] * shape[1]
+def _kernel(
+    module: Any, function: Function, sources: Sequence[Array], samples: Sequence[Array], numbers: Any, rows: int
+) -> _Kernel:
+    """The kernel of a kind: for each source a loop over the samples."""
+    import drjit as dr
 
-    def whole(value: Any) -> Any:
-        each = number(value)
-        return each if dr.width(each) == size else each + dr.zeros(number, size)
+    number, integer = module.Float64, module.UInt32
+    own = [x.ndim > 1 for x in samples]
 
-    found = [[whole(value) for value in _channels(group)] for group in [*groups, sums]]
-    dr.eval(found)
-    *arrays, totals = ([x.numpy().reshape(shape) for x in group] for group in found)
-    stacked = [each[0][..., None] if len(each) == 1 else np.stack(each, axis=-1) for each in arrays]
-    return stacked, np.array([x.sum(axis=1) for x in totals])
+    def launch(
+        source: Any, of_sources: Sequence[Any], of_samples: Sequence[Any], given: Any, sizes: Any, outs: Sequence[Any]
+    ) -> tuple[list[Any], list[Any], Sequence[Any]]:
+        width, count, last = (dr.gather(integer, sizes, k) for k in range(3))
+        places = itertools.count(1)
+        read = _mapped(numbers, lambda _: dr.gather(number, given, next(places)), module.Array3f64)
+
+        def found(k: Any) -> Found:
+            each = [dr.gather(number, x, k * width + source if of_own else k) for x, of_own in zip(of_samples, own)]
+            return function([dr.gather(number, x, source) for x in of_sources], each, read)
+
+        def step(k: Any, sums: list[Any], largest: list[Any]) -> tuple[Any, list[Any], list[Any]]:
+            more = found(k)
+            for light, parts in zip(more.deposits, outs):
+                values = [value * wave for value in light.values for wave in light.waves]
+                first = dr.int_array_t(number)(light.first)
+                for j, share in enumerate(light.shares):
+                    row = dr.select(first < 0, last, integer(first)) if j == 0 else integer(first + j)
+                    for (begin, part), out in zip(_packets(len(values)), parts):
+                        packet = [share * value for value in values[begin : begin + part]]
+                        packet += [number(0)] * (part - len(packet))
+                        place = row * width + source
+                        add = packet[0] if part == 1 else module.ArrayXf64(packet)
+                        dr.scatter_reduce(dr.ReduceOp.Add, out, add, place, mode=dr.ReduceMode.NoConflicts)
+            sums = [total + value for total, value in zip(sums, _channels(more.sums))]
+            largest = [dr.maximum(most, value) for most, value in zip(largest, _channels(more.largest))]
+            return k + 1, sums, largest
+
+        start = [number(0)] * shape[0], [number(-np.inf)] * shape[1]
+        _, sums, largest = dr.while_loop((integer(0), *start), lambda k, *_: k < count, step, mode="symbolic")
+        return sums, largest, outs
+
+    once = _plain(function, [x[:1] for x in sources], [x[..., :1][:1] for x in samples], numbers, rows)
+    shape = len(once[0]), len(once[1])
+    frozen = dr.freeze(launch, limit=SIZES, warn_after=1 << 30)
+    return _Kernel(frozen, [light.shape[:2] for light in once[2]])
+
+
+def _packets(count: int) -> list[tuple[int, int]]:
+    """Where values that are written together begin, and how many they are: a power of two."""
+    return [(k, 1 << (min(count - k, WIDTH) - 1).bit_length()) for k in range(0, count, WIDTH)]
 
 
 @functools.lru_cache(maxsize=32)
-def _places(integer: Any, sources: int, samples: int) -> tuple[Any, Any]:
-    """The source and the sample of each value; quicker to read than to divide for."""
-    source, sample = np.divmod(np.arange(sources * samples, dtype=np.uint32), np.uint32(samples))
-    return integer(aligned(source, np.uint32)), integer(aligned(sample, np.uint32))
+def _numbered(integer: Any, count: int) -> Any:
+    return integer(aligned(np.arange(count), np.uint32))
 
 
 def _channels(group: Sequence[Value]) -> list[Value]:
@@ -162,6 +268,8 @@ def _nested(value: Any) -> bool:
 
 def _mapped(value: Any, number: Callable[[float], Any], colour: Callable[[list[Any]], Any] = list) -> Any:
     """The value with all of its numbers, and its colours, replaced."""
+    if isinstance(value, Varying):
+        return [number(float(x)) for x in value]
     if isinstance(value, list | tuple):
         each = [_mapped(x, number, colour) for x in value]
         return type(value)(*each) if hasattr(value, "_fields") else type(value)(each)
@@ -182,6 +290,8 @@ def _mapped(value: Any, number: Callable[[float], Any], colour: Callable[[list[A
 
 def _kind(value: Any) -> Hashable:
     """A value without its numbers: equal for values that one kernel serves."""
+    if isinstance(value, Varying):
+        return Varying, len(value)
     if isinstance(value, list | tuple):
         return type(value), *map(_kind, value)
     if is_dataclass(value) and not isinstance(value, type):
@@ -198,6 +308,8 @@ def _kind(value: Any) -> Hashable:
 
 def _foreign(value: Any) -> bool:
     """Whether a value has objects that kernels cannot read."""
+    if isinstance(value, Varying):
+        return False
     if isinstance(value, list | tuple):
         return any(map(_foreign, value))
     if is_dataclass(value) and not isinstance(value, type):

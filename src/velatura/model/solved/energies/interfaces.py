@@ -173,7 +173,7 @@ class _Met:
         again = facets.across > 0 and setting.often is not None
         events = FirstEvents(facets, tuple(setting.ways), again)
         lights, others = setting.basis.deposited(
-            events, p, psi, fibonacci(setting.samples), events.numbers(setting.samples)
+            events, p, psi, fibonacci(setting.samples), events.numbers(setting.samples), events.kind
         )
         # Stencils keep the energy
         totals = [light[-events.colours :, 0].sum(axis=1) for light in lights]

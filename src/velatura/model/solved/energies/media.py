@@ -21,6 +21,7 @@ from velatura.model.solved.lobes import top_medium
 from velatura.ops import Value
 from velatura.optics.ggx import Direction
 from velatura.optics.phase import HenyeyGreenstein, PhaseFunction, deflect
+from velatura.renderer.compiled import Varying
 from velatura.renderer.low_discrepancy import fibonacci
 from velatura.stack import SlabValues
 
@@ -108,7 +109,9 @@ def _scattered(slab: Slab, p: Array, psi: Array, setting: Setting) -> tuple[Arra
     media."""
     key = _scattered, slab.n, slab.phase.key, setting.events, p.tobytes(), psi.tobytes(), setting.basis.nodes.ends
     lattice = _lattice(slab.phase, setting.events)
-    return tuple(setting.kept(key, lambda: setting.basis.deposited(_events, p, psi, lattice, [slab.n])[0]))
+    return tuple(
+        setting.kept(key, lambda: setting.basis.deposited(_events, p, psi, lattice, Varying([slab.n]), _events)[0])
+    )
 
 
 def _lattice(phase: PhaseFunction, finely: bool) -> tuple[Array, Array, Array]:
@@ -157,4 +160,5 @@ def escaped(phase: PhaseFunction, depth: Array, basis: Basis, p: Array, through:
             lights.append(Light(x, y, [share * down * light for light in passing]))
         return lights, []
 
-    return basis.deposited(escapes, p, np.zeros_like(p), _lattice(phase, True), [*depth.tolist()])[0]
+    lattice, numbers = _lattice(phase, True), Varying(depth.tolist())
+    return basis.deposited(escapes, p, np.zeros_like(p), lattice, numbers, (escaped, through))[0]

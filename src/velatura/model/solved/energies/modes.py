@@ -16,16 +16,16 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.sparse import csc_array
 
 from velatura import ops
 from velatura.model.rough_interface import Light, Scatter
 from velatura.model.solved.energies.matrices import Blocks
-from velatura.model.solved.energies.nodes import STENCIL, Nodes
+from velatura.model.solved.energies.nodes import Nodes
 from velatura.model.solved.energies.operators import Operator
 from velatura.model.solved.guards import MOMENTUM_MIN
 from velatura.ops import Value
 from velatura.renderer import compiled
+from velatura.renderer.compiled import Deposit, Found, Varying
 
 Array = NDArray[np.floating]
 
@@ -53,6 +53,11 @@ class Basis(ABC):
 
     @property
     @abstractmethod
+    def kind(self) -> Hashable:
+        """All that `angular` depends on."""
+
+    @property
+    @abstractmethod
     def size(self) -> int:
         """Rows and columns of a matrix, n."""
 
@@ -70,47 +75,37 @@ class Basis(ABC):
         """Whether modes change sign in half a turn."""
 
     def deposited(
-        self, scatter: Scatter, p: Array, psi: Array, samples: Sequence[Array], numbers: Sequence[Any]
+        self,
+        scatter: Scatter,
+        p: Array,
+        psi: Array,
+        samples: Sequence[Array],
+        numbers: Sequence[Any],
+        kind: Hashable,
     ) -> tuple[list[Array], Array]:
         """Sums over the samples of sources of lengths p at azimuths psi (S,): of each light the K weights by mode and
-        node, (K, modes, N, S), and of other values, (L, S)."""
+        node, (K, modes, N, S), and of other values, (L, S). `kind` is all that `scatter` depends on beside numbers."""
         parts = self.nodes.numbers
-        count = len(parts)
 
-        def function(
-            sources: Sequence[Value], lattice: Sequence[Value], values: Sequence[Value]
-        ) -> tuple[list[Sequence[Value]], Sequence[Value]]:
-            lights, others = scatter(sources, lattice, values[count:])
-            groups: list[Sequence[Value]] = []
+        def function(sources: Sequence[Value], lattice: Sequence[Value], values: Any) -> Found:
+            known, own = values
+            lights, others = scatter(sources, lattice, own)
+            deposits = []
             for light in lights:
                 length, cosine, sine = _polar(light)
-                first, shares = self.nodes.stencil(length, values[:count])
-                groups += [[first], shares, [cosine, sine], light.weights]
-            return groups, others
+                first, shares = self.nodes.stencil(length, known)
+                deposits.append(Deposit(first, shares, light.weights, self.angular(cosine, sine)))
+            return Found(others, (), deposits)
 
-        def sums(groups: list[Array]) -> list[Array]:
-            return [self._sums(*groups[k : k + 4]) for k in range(0, len(groups), 4)]
-
-        return compiled.over(function, (p, psi), samples, [*parts, *numbers], sums)
-
-    def _sums(self, first: Array, shares: Array, azimuth: Array, weights: Array) -> Array:
-        """Sums of weights (S, samples, K) by mode and node, for stencils that begin at nodes `first`, at azimuths by
-        their cosine and sine."""
-        sources, samples, count = weights.shape
-        # Not in the function, whose kernels any number of modes shares
-        modes = np.stack(np.broadcast_arrays(*self.angular(azimuth[..., 0], azimuth[..., 1])), axis=-1)
-        weights = weights[..., :, None] * modes[..., None, :]
-        node, source = first[..., 0].astype(np.int32), np.arange(sources, dtype=np.int32)[:, None]
-        # Samples are columns of a sparse matrix; what lies on the far side of 0 has a row of its own
-        rows = (node * np.int32(sources) + source)[..., None] + np.int32(sources) * np.arange(STENCIL, dtype=np.int32)
-        rows[..., 0] += np.where(node < 0, np.int32((self.nodes.count + 1) * sources), 0)
-        shape = (self.nodes.count + 1) * sources, sources * samples
-        entries = shares.ravel(), rows.ravel(), np.arange(0, shares.size + 1, STENCIL, dtype=np.int32)
-        found = (csc_array(entries, shape) @ weights.reshape(sources * samples, count * len(self.odd))).T
-        found = found.reshape(count, len(self.odd), self.nodes.count + 1, sources)
+        kind = kind, self.kind, len(self.nodes.cells)
+        others, _, lights = compiled.over(
+            function, (p, psi), samples, (Varying(parts), numbers), self.nodes.count, kind
+        )
+        # What lies on the far side of 0
         sign = np.where(self.odd, -1, 1)[:, None]
-        found[:, :, 1] += sign * found[:, :, -1]
-        return np.asarray(found[:, :, :-1])
+        for light in lights:
+            light[:, :, 1] += sign * light[:, :, -1]
+        return [np.ascontiguousarray(light[:, :, :-1]) for light in lights], others
 
     @property
     @abstractmethod
@@ -167,6 +162,10 @@ class Relative(Basis):
     @property
     def deposits(self) -> Hashable:
         return self.nodes.cells, self.orders
+
+    @property
+    def kind(self) -> Hashable:
+        return Relative, self.orders
 
     @property
     def size(self) -> int:
@@ -237,6 +236,10 @@ class Even(Basis):
     @property
     def deposits(self) -> Hashable:
         return self.nodes.cells, self.orders, self.mirrored
+
+    @property
+    def kind(self) -> Hashable:
+        return Even, self.orders, self.mirrored
 
     @property
     def waves(self) -> list[tuple[int, bool]]:

@@ -28,6 +28,7 @@ from velatura.ops import Value
 from velatura.optics import ggx
 from velatura.optics.ggx import Direction
 from velatura.renderer import compiled, low_discrepancy
+from velatura.renderer.compiled import Found
 
 Array = NDArray[np.floating]
 
@@ -164,7 +165,7 @@ def integral(lobe: RefractedLobe, wi: Direction, normals: int = NORMALS) -> Valu
     """
     directions, numbers = _split(lobe, wi)
     return lobe.weight * _mean(
-        compiled.over(_values, directions, low_discrepancy.fibonacci(normals), numbers)[1], normals
+        compiled.over(_values, directions, low_discrepancy.fibonacci(normals), numbers)[0], normals
     )
 
 
@@ -172,10 +173,9 @@ def integrals(lobe: RefractedLobe, wi: Direction, normals: int = NORMALS) -> tup
     """Mean of the weights of samples, and of their squares, and the largest one, as `integral`, for a weight of 1."""
     directions, numbers = _split(lobe, wi)
     u1, u2 = low_discrepancy.fibonacci(normals)
-    _, sums = compiled.over(_values, directions, (u1, u2), numbers)
+    sums, _, _ = compiled.over(_values, directions, (u1, u2), numbers)
     few = u1[::SPARSE], u2[::SPARSE]
-    (weights,), squares = compiled.over(_weights, directions, few, numbers)
-    largest = np.moveaxis(weights.max(axis=1), -1, 0)
+    squares, largest, _ = compiled.over(_weights, directions, few, numbers)
     return _mean(sums, len(u1)), _mean(squares, len(few[0])), largest if len(largest) > 1 else largest[0]
 
 
@@ -197,11 +197,11 @@ def _joined(directions: Sequence[Value], numbers: Any) -> tuple[RefractedLobe, D
     return RefractedLobe(1.0, Roughness(*roughness), n, facets, leaving), (x, y, z)
 
 
-def _values(directions: Sequence[Value], lattice: Sequence[Value], numbers: Any) -> tuple[list[Any], list[Value]]:
-    return [], [_sampled(*_joined(directions, numbers), *lattice)[0]]
+def _values(directions: Sequence[Value], lattice: Sequence[Value], numbers: Any) -> Found:
+    return Found([_sampled(*_joined(directions, numbers), *lattice)[0]])
 
 
-def _weights(directions: Sequence[Value], lattice: Sequence[Value], numbers: Any) -> tuple[list[Any], list[Value]]:
+def _weights(directions: Sequence[Value], lattice: Sequence[Value], numbers: Any) -> Found:
     lobe, wi = _joined(directions, numbers)
     value, i, o = _sampled(lobe, wi, *lattice)
     alpha_u, alpha_v, n, _ = _inside(lobe, wi)
@@ -213,7 +213,7 @@ def _weights(directions: Sequence[Value], lattice: Sequence[Value], numbers: Any
         near = 0.5 * _facing(_squares((i[0] + o[0], i[1] + o[1], i[2] + o[2])), squares)
         far = n.ring * o[2] * _facing(_squares(_far(i, (o[0], o[1]), p2, n)[0]), squares)
         weights = value * (near / (near + ops.maximum(far, 0.0)))
-    return [[weights]], [weights * value]
+    return Found([weights * value], [weights])
 
 
 def _sampled(lobe: RefractedLobe, wi: Direction, u1: Value, u2: Value) -> tuple[Value, Direction, Direction]:

@@ -56,6 +56,7 @@ from velatura.ops import Value
 from velatura.optics import fresnel, ggx
 from velatura.optics.ggx import Direction
 from velatura.renderer import compiled, low_discrepancy
+from velatura.renderer.compiled import Found
 from velatura.stack import InterfaceValues, Material, SlabValues
 from velatura.stack.chain import chain
 
@@ -571,18 +572,16 @@ def integrals(
     z = np.sqrt(np.maximum(1 - x * x - y * y, 1e-12))
     area = area / (n_out * n_out * z)
     directions = [each.reshape(len(x), -1) for each in (x, y, -z, area)]
-    _, found = compiled.over(_passed, wi, directions, wider(transmission))
+    found, _, _ = compiled.over(_passed, wi, directions, wider(transmission))
     *energy, passes = found
     count = len(energy) // 2
     return np.array(energy[:count]), np.array(energy[count:]), passes
 
 
-def _passed(
-    wi: Sequence[Value], directions: Sequence[Value], transmission: Transmission
-) -> tuple[list[list[Value]], list[Value]]:
+def _passed(wi: Sequence[Value], directions: Sequence[Value], transmission: Transmission) -> Found:
     x, y, z, area = directions
     value, density = _eval_pdf(transmission, (wi[0], wi[1], wi[2]), (x, y, z), True)
-    return [], [value * area, value * area * ops.divide(value, density), density * area]
+    return Found([value * area, value * area * ops.divide(value, density), density * area])
 
 
 def wider(values: Any) -> Any:
