@@ -7,6 +7,7 @@ follows once so many values of its kind have been worked out without it.
 
 from __future__ import annotations
 
+import contextlib
 import copy
 import functools
 import itertools
@@ -15,7 +16,7 @@ from collections.abc import Callable, Hashable, Sequence
 from dataclasses import dataclass, fields, is_dataclass
 from threading import Lock
 from types import MethodType
-from typing import Any, NamedTuple, cast
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -83,13 +84,14 @@ def over(
     `kind`. It runs by NumPy alone if other objects are among them.
     """
     count, width = samples[0].shape[-1], len(sources[0])
-    kernels = None
-    if width * count > LEAST and not _foreign(numbers):
-        kind = function.__module__, function.__qualname__, kind, *(x.ndim for x in samples), _kind(numbers)
-        kernels = kernel.llvm() if _asked[kind] >= (MANY_DEPOSITED if rows else MANY) else None
-        _asked[kind] += 0 if kernels else width * count
-    if kernels:
-        return _compiled(kernels, kind, function, sources, samples, numbers, rows)
+    if width * count > LEAST:
+        with contextlib.suppress(_Foreign):
+            flat: list[float] = []
+            kind = function.__module__, function.__qualname__, kind, *(x.ndim for x in samples), _kind(numbers, flat)
+            kernels = kernel.llvm() if _asked[kind] >= (MANY_DEPOSITED if rows else MANY) else None
+            if kernels:
+                return _compiled(kernels, kind, function, sources, samples, numbers, flat, rows)
+            _asked[kind] += width * count
     size = max(BLOCK // count, 1)
     found = []
     for first in range(0, max(width, 1), size):
@@ -154,6 +156,7 @@ def _compiled(
     sources: Sequence[Array],
     samples: Sequence[Array],
     numbers: Any,
+    flat: Sequence[float],
     rows: int,
 ) -> tuple[Array, Array, list[Array]]:
     """One kernel for all values: numbers are read from an array, so that others need no kernel of their own."""
@@ -164,11 +167,9 @@ def _compiled(
         return module.Float64(aligned(np.ravel(values), np.float64))
 
     width = len(sources[0])
-    flat: list[float] = [0.0]
-    _mapped(numbers, flat.append)
     sizes = module.UInt32(aligned(np.array([width, samples[0].shape[-1], rows]), np.uint32))
     # Sources of a sample lie side by side
-    given = [array(x) for x in sources], [array(x.T if x.ndim > 1 else x) for x in samples], array(flat), sizes
+    given = [array(x) for x in sources], [array(x.T if x.ndim > 1 else x) for x in samples], array([0.0, *flat]), sizes
     with _launching:
         if kind not in _kernels:
             _kernels[kind] = _kernel(module, function, sources, samples, numbers, rows)
@@ -288,34 +289,44 @@ def _mapped(value: Any, number: Callable[[float], Any], colour: Callable[[list[A
     return value
 
 
-def _kind(value: Any) -> Hashable:
-    """A value without its numbers: equal for values that one kernel serves."""
+class _Foreign(Exception):
+    """A value has objects that kernels cannot read."""
+
+
+def _kind(value: Any, flat: list[float]) -> Hashable:
+    """A value without its numbers, which `flat` gets in the order of `_mapped`: equal where one kernel serves.
+
+    Raises _Foreign for what no kernel reads.
+    """
     if isinstance(value, Varying):
+        flat.extend(map(float, value))
         return Varying, len(value)
     if isinstance(value, list | tuple):
-        return type(value), *map(_kind, value)
-    if is_dataclass(value) and not isinstance(value, type):
-        return type(value), *(_kind(getattr(value, x.name)) for x in fields(value))
-    if isinstance(value, MethodType):
-        return value.__name__, _kind(value.__self__)
-    if isinstance(value, np.ndarray) and value.size > 1:
-        return np.ndarray
-    if isinstance(value, float | np.floating | np.ndarray):
-        plain = float(np.asarray(value).item())
-        return plain if plain in (0, 1) else float
-    return cast(Hashable, value)
-
-
-def _foreign(value: Any) -> bool:
-    """Whether a value has objects that kernels cannot read."""
-    if isinstance(value, Varying):
-        return False
-    if isinstance(value, list | tuple):
-        return any(map(_foreign, value))
-    if is_dataclass(value) and not isinstance(value, type):
-        return any(_foreign(getattr(value, x.name)) for x in fields(value))
-    if isinstance(value, MethodType):
-        return _foreign(value.__self__)
+        return type(value), *[_kind(x, flat) for x in value]
     if isinstance(value, np.ndarray):
-        return value.size > 1 and (value.ndim == 1 or value.size != COLOURS)
-    return not isinstance(value, float | int | np.floating | type(None))
+        if value.size > 1:
+            if value.ndim == 1 or value.size != COLOURS:
+                raise _Foreign
+            flat.extend(value.ravel().tolist())
+            return np.ndarray
+        value = value.item()
+    if isinstance(value, float | np.floating):
+        plain = float(value)
+        if plain in (0, 1):
+            return plain
+        flat.append(plain)
+        return float
+    if value is None or isinstance(value, int):
+        return value
+    if isinstance(value, MethodType):
+        return value.__name__, _kind(value.__self__, flat)
+    names = _fields(type(value))
+    if names is None:
+        raise _Foreign
+    return type(value), *[_kind(getattr(value, name), flat) for name in names]
+
+
+@functools.lru_cache(maxsize=256)
+def _fields(kind: type) -> list[str] | None:
+    """Names of the fields of a record; None of what is none."""
+    return [x.name for x in fields(kind)] if is_dataclass(kind) else None

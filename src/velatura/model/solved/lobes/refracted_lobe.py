@@ -13,7 +13,7 @@ roughnesses, and G1(w) / w_z, which is finite at grazing directions. Indices are
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from math import pi
 from typing import Any
 
@@ -173,10 +173,17 @@ def integrals(lobe: RefractedLobe, wi: Direction, normals: int = NORMALS) -> tup
     """Mean of the weights of samples, and of their squares, and the largest one, as `integral`, for a weight of 1."""
     directions, numbers = _split(lobe, wi)
     u1, u2 = low_discrepancy.fibonacci(normals)
-    sums, _, _ = compiled.over(_values, directions, (u1, u2), numbers)
-    few = u1[::SPARSE], u2[::SPARSE]
-    squares, largest, _ = compiled.over(_weights, directions, few, numbers)
-    return _mean(sums, len(u1)), _mean(squares, len(few[0])), largest if len(largest) > 1 else largest[0]
+    few = (np.arange(len(u1)) % SPARSE == 0).astype(float)
+    sums, largest, _ = compiled.over(_weights, directions, (u1, u2, few), numbers)
+    values, squares = np.split(sums, 2)
+    return _mean(values, len(u1)), _mean(squares, int(few.sum())), largest if len(largest) > 1 else largest[0]
+
+
+def integrals_of_facets(lobe: RefractedLobe, wi: Direction, normals: int = NORMALS) -> tuple[Value, Value]:
+    """Albedo of a lobe of weight 1 whose facets reflect all light, and of the lobe, as `integral`."""
+    directions, numbers = _split(lobe, wi)
+    sums, _, _ = compiled.over(_both, directions, low_discrepancy.fibonacci(normals), numbers)
+    return _mean(sums[:1], normals), _mean(sums[1:], normals)
 
 
 def _mean(sums: Array, count: int) -> Array:
@@ -201,9 +208,15 @@ def _values(directions: Sequence[Value], lattice: Sequence[Value], numbers: Any)
     return Found([_sampled(*_joined(directions, numbers), *lattice)[0]])
 
 
+def _both(directions: Sequence[Value], lattice: Sequence[Value], numbers: Any) -> Found:
+    lobe, wi = _joined(directions, numbers)
+    return Found([_sampled(each, wi, *lattice)[0] for each in (replace(lobe, facets=None), lobe)])
+
+
 def _weights(directions: Sequence[Value], lattice: Sequence[Value], numbers: Any) -> Found:
     lobe, wi = _joined(directions, numbers)
-    value, i, o = _sampled(lobe, wi, *lattice)
+    u1, u2, few = lattice
+    value, i, o = _sampled(lobe, wi, u1, u2)
     alpha_u, alpha_v, n, _ = _inside(lobe, wi)
     weights = value
     if not n.is_outside:
@@ -213,7 +226,7 @@ def _weights(directions: Sequence[Value], lattice: Sequence[Value], numbers: Any
         near = 0.5 * _facing(_squares((i[0] + o[0], i[1] + o[1], i[2] + o[2])), squares)
         far = n.ring * o[2] * _facing(_squares(_far(i, (o[0], o[1]), p2, n)[0]), squares)
         weights = value * (near / (near + ops.maximum(far, 0.0)))
-    return Found([weights * value], [weights])
+    return Found([value, few * weights * value], [few * weights])
 
 
 def _sampled(lobe: RefractedLobe, wi: Direction, u1: Value, u2: Value) -> tuple[Value, Direction, Direction]:

@@ -231,11 +231,11 @@ def features(
     sin2 = 1 - cos_theta * cos_theta
     wi = np.sqrt(sin2), np.zeros_like(sin2), cos_theta
     lobe = RefractedLobe(1.0, first.roughness(np.zeros_like(sin2)), n, None, opener.leaving)
-    let_out = refracted_lobe.integral(lobe, wi, COARSE)
-    reflected = part.reflectance(cosine)
-    expected = ops.mean(reflected * share) * let_out
-    below = 1.0
-    if not part.opaque:
+    reflected, below = part.reflectance(cosine), 1.0
+    if part.opaque:
+        let_out = refracted_lobe.integral(lobe, wi, COARSE)
+        expected = ops.mean(reflected * share) * let_out
+    else:
         assert part.below is not None
         below = float(ops.mean(part.below)) / n
 
@@ -243,7 +243,7 @@ def features(
             return np.asarray(ops.mean(part.reflectance(np.sqrt(cos2))))
 
         facets = _Facet(below) if part.films is None else coated
-        both = refracted_lobe.integral(replace(lobe, facets=facets), wi, COARSE)
+        let_out, both = refracted_lobe.integrals_of_facets(replace(lobe, facets=facets), wi, COARSE)
         reflected = both / np.maximum(let_out, 1e-9)
         expected = both * ops.mean(share)
     brighter = np.log(np.maximum(energy, 1e-9) / np.maximum(expected, 1e-9))
