@@ -8,12 +8,16 @@ furnace, path depth 40, and the noise of a block in the studio at equal samples,
 beside a `roughdielectric` that is divided by its albedo, which keeps light as well. So of spheres of opaque presets,
 beside `belcour2018`; the light of pictures is another ratio.
 
-    python benchmarks/render.py [--rounds 9] [--spp 64] [--variant llvm_ad_rgb] [--model NAME] [--solids]
+With `--mixtures`: gold under a coat, paint under a coat, and mixtures of the two, by a mask of 0 and 1 and of half and
+half everywhere; processor time beside the dearer of the parts.
+
+    python benchmarks/render.py [--rounds 9] [--spp 64] [--variant llvm_ad_rgb] [--model NAME] [--solids] [--mixtures]
 """
 
 from __future__ import annotations
 
 import time
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -57,6 +61,20 @@ def bsdfs(mi, model: str) -> dict:
     return found
 
 
+def mixtures(mi, model: str) -> dict:
+    """Two parts, and mixtures of them, by name; a mask has patches of 16 x 16 texels."""
+    paint = vt.Stack([vt.Interface(eta=1.5, alpha=0.1), vt.Medium(sigma_a=(0.02, 0.06, 0.3)), vt.Diffuse(albedo=0.5)])
+    parts = {"gold": stacks()["two interfaces"], "paint": paint}
+    material = vt.stack.dumps(vt.Mix([(0.5, parts["gold"]), (None, paint)]), "json")
+    patches = np.kron(np.random.default_rng(0).integers(0, 2, (16, 16)), np.ones((16, 16)))
+    mask = {"type": "bitmap", "bitmap": mi.Bitmap(patches[..., None].astype(np.float32)), "raw": True}
+    plugin = {"type": "layered", "material": material, "model": model}
+    return {name: vt.bsdf(stack, model=model) for name, stack in parts.items()} | {
+        "mask of 0 and 1": mi.load_dict({**plugin, "part0_weight": {**mask, "filter_type": "nearest"}}),
+        "half and half": mi.load_dict(plugin),
+    }
+
+
 def picture(mi, bsdf, size: int, spp: int):
     """What renders the ball once, for a seed."""
     import drjit as dr
@@ -71,16 +89,16 @@ def picture(mi, bsdf, size: int, spp: int):
     return job
 
 
-def timed(jobs: dict, rounds: int) -> dict[Any, list[float]]:
+def timed(jobs: dict, rounds: int, clock: Callable[[], float] = time.perf_counter) -> dict[Any, list[float]]:
     """Seconds that each job takes, interleaved, once per round."""
     times: dict[Any, list[float]] = {name: [] for name in jobs}
     for job in jobs.values():
         job(0)  # compile
     for number in range(rounds):
         for name, job in jobs.items():
-            start = time.perf_counter()
+            start = clock()
             job(number + 1)
-            times[name].append(time.perf_counter() - start)
+            times[name].append(clock() - start)
     return times
 
 
@@ -191,6 +209,7 @@ def main() -> None:
         variant="llvm_ad_rgb",
         model=DEFAULT,
         solids=(False, "solids of rough glass, and noise"),
+        mixtures=(False, "mixtures beside their parts"),
     )
     mi = kernel.mitsuba(arguments.variant)
     import drjit as dr
@@ -199,7 +218,7 @@ def main() -> None:
     if arguments.solids:
         solids(mi, arguments.model)
         return
-    materials = bsdfs(mi, arguments.model)
+    materials = (mixtures if arguments.mixtures else bsdfs)(mi, arguments.model)
 
     def evaluation(bsdf, count: int = arguments.count):
         rng = mi.PCG32(count)
@@ -218,6 +237,12 @@ def main() -> None:
         return picture(mi, bsdf, arguments.size, arguments.spp)
 
     for title, make in (("render", render), ("eval_pdf", evaluation)):
+        if arguments.mixtures:
+            times = timed({name: make(bsdf) for name, bsdf in materials.items()}, arguments.rounds, time.process_time)
+            dearer = times["gold" if sum(times["gold"]) > sum(times["paint"]) else "paint"]
+            for name, seconds in times.items():
+                row(title, f"mixture, {name}", [t / d for t, d in zip(seconds, dearer)], "x the dearer part")
+            continue
         times = timed({name: make(bsdf) for name, bsdf in materials.items()}, arguments.rounds)
         for name, seconds in times.items():
             row(title, name, [t / first for t, first in zip(seconds, times["principled"])], "x principled")

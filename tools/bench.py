@@ -39,7 +39,7 @@ COMMANDS = {
     "inverse": ["", "--parts films --seed 1", "--parts physical rough --models bati2021 --physical 500 --seed 1"],
     "laws": ["", "--random 500"],
     "metals": ["--walks 400000"],
-    "render": ["", "--solids"],
+    "render": ["", "--solids", "--mixtures"],
     "shader": ["--language all", "--textured"],
 }
 FIRST = ("walks",)  # which others read

@@ -279,3 +279,83 @@ def test_mixtures_in_other_variants_are_weighted_sums(variant: str) -> None:
             assert np.allclose(np.array(weight).ravel() * np.array(pdf), np.array(value).ravel(), rtol=1e-4)
     finally:
         kernel.mitsuba("llvm_ad_rgb")
+
+
+# Around the plugins --------------------------------------------------------------------------------------------------
+
+
+def test_walks_through_a_mixture_agree_with_its_lobes_and_with_the_plugin() -> None:
+    """Albedos within .004, of which the model's own error is the most; 6 standard errors of the walk are .003."""
+    mix = vt.Mix([(0.4, PAINT), (None, vt.Stack([vt.Interface(eta=0.2, k=3.9, alpha=0.3)]))])
+    found = vt.compare(mix, ["velatura", "reference"], [0.7], paths=2**18)
+    assert found.lobe_names == ("part0 R1", "part0 D", "part1 R1")
+    modelled = vt.lobes(mix, 0.7)
+    total = sum(modelled.energy) + modelled.remainder
+    assert np.allclose(found.models["velatura"].albedo, total, atol=1e-6)
+    assert np.allclose(found.truth.albedo, total, atol=0.004)
+    assert np.allclose(found.models["reference"].evaluated, found.truth.albedo, atol=0.004)
+    assert found.total_variation["velatura"][0] < 0.05
+    si = dr.zeros(mi.SurfaceInteraction3f)
+    si.wi = mi.Vector3f(0.51**0.5, 0, 0.7)
+    assert np.allclose(np.array(vt.bsdf(mix).eval_diffuse_reflectance(si)), total, atol=0.002)
+    walks = vt.bsdf(mix, "reference")
+    many = dr.gather(mi.SurfaceInteraction3f, si, dr.zeros(mi.UInt32, 2**18))
+    u = RNG.random((3, 2**18))
+    _, weight = walks.sample(context(), many, mi.Float(u[0]), mi.Point2f(u[1:]))
+    assert np.allclose(np.array(weight).mean(axis=1), found.truth.albedo[:, 0], atol=0.006)
+
+
+@pytest.mark.parametrize("mix", [WORN, NESTED], ids=["worn", "nested"])
+def test_mixtures_keep_the_laws(mix: vt.Mix) -> None:
+    """One report in 1000 is a false alarm, and seeds are fixed."""
+    report = vt.check(mix)
+    assert report.passed, report.broken
+    assert not report["energy"].declared or mix is NESTED
+
+
+def test_baked_and_inverse_refuse_in_one_line(run: Any, tmp_path: Path) -> None:
+    vt.save(WORN, tmp_path / "worn.yaml")
+    path = str(tmp_path / "worn.yaml")
+    for arguments in (
+        ("export", path, "--to", "glsl"),
+        ("coat", path, "--eta", "1.5", "--alpha", "0.1"),
+        ("simplify", path, "--interfaces", "1"),
+        ("compare", path, "--models", "openpbr", "--paths", "100"),
+    ):
+        status, out, err = run(*arguments)
+        assert status == 2 and not out
+        assert err.count("\n") == 1 and err.endswith("takes a single stack, not a mixture\n"), err
+
+
+def test_a_texture_of_weights_is_recovered_from_a_picture() -> None:
+    """A square of soot and metal by a mask of 4 x 4 texels, seen from above under a grey sky."""
+    sooty = vt.Mix([(0.5, vt.Stack([vt.Diffuse(albedo=0.05)])), (None, METAL)])
+    true = np.random.default_rng(5).random((4, 4, 1)).astype(np.float32)
+
+    def scene(texels: Any) -> Any:
+        film = {"type": "hdrfilm", "width": 16, "height": 16, "rfilter": {"type": "box"}}
+        view = mi.ScalarTransform4f().look_at([0, 0, 4], [0, 0, 0], [0, 1, 0])
+        return mi.load_dict(
+            {
+                "type": "scene",
+                "integrator": {"type": "prb", "max_depth": 2},
+                "sensor": {"type": "perspective", "fov": 28, "to_world": view, "film": film},
+                "sky": {"type": "constant", "radiance": 1.0},
+                "square": {"type": "rectangle", "bsdf": plugin_of(sooty, part0_weight=image(texels))},
+            }
+        )
+
+    target = mi.render(scene(true), spp=256, seed=1000)
+    start = scene(np.full((4, 4, 1), 0.5))
+    parameters, key = mi.traverse(start), "square.bsdf.part0_weight.data"
+    optimiser = mi.ad.Adam(lr=0.08, params={"weight": mi.TensorXf(parameters[key])})
+    for step in range(30):
+        optimiser["weight"] = dr.clip(optimiser["weight"], 0, 1)
+        parameters[key] = optimiser["weight"]
+        parameters.update()
+        picture = mi.render(start, parameters, spp=16, seed=step)
+        dr.backward(dr.mean(dr.square(picture - target), axis=None))
+        optimiser.set_learning_rate(0.08 * 0.92**step)
+        optimiser.step()
+    off = np.abs(np.array(optimiser["weight"]) - true)
+    assert off.max() < 0.05 and np.abs(0.5 - true).max() > 0.4

@@ -66,11 +66,16 @@ class Image:
         return self.texture.class_name() not in SPECTRA
 
     def at(self, si: Any, active: Any) -> Any:
-        """The value at a surface point: a colour or spectrum, or a number."""
+        """The value at a surface point: a colour or spectrum, or a number.
+
+        Gradients pass at the ends of the range and beyond, as those of constants.
+        """
         import drjit as dr
 
         value = self.texture.eval(si, active) if self.colour else self.texture.eval_1(si, active)
-        return dr.clip(value * self.scale + self.offset, self.low, self.high)
+        value = value * self.scale + self.offset
+        within = dr.clip(value, self.low, self.high)
+        return dr.replace_grad(within, value) if dr.grad_enabled(value) else within
 
     def range(self, mi: Any, name: str) -> Range | None:
         """The range of its texels; None where it has none, or they stand for spectra.

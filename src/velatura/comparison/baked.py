@@ -10,14 +10,14 @@ from velatura.bakes import Bake
 from velatura.comparison.plugins import without_lobes
 from velatura.comparison.result import Account
 from velatura.errors import InvalidInput
-from velatura.stack import Stack
+from velatura.stack import Described
 
 RENDERED = "mitsuba-principled"
 
 
-def account(made: Bake, stack: Stack, cos_theta: Sequence[float]) -> Account:
+def account(made: Bake, material: Described, cos_theta: Sequence[float]) -> Account:
     """The distribution of a bake's light; its lobes are unknown, and NaN."""
-    return without_lobes(stack, bakes.distribution(made, stack, cos_theta))
+    return without_lobes(material, bakes.distribution(made, material, cos_theta))
 
 
 def check_pictures(names: Sequence[str]) -> None:

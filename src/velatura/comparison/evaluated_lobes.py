@@ -60,7 +60,7 @@ def account(stack: Stack, cos_theta: Sequence[float], model: Model) -> Account:
     names = [field.name for field in dataclasses.fields(WalkedLobe)]
     rows = zip(*(lobes for lobes, _ in columns))
     lobes = tuple(WalkedLobe(**{n: np.stack([getattr(x, n) for x in row], axis=-1) for n in names}) for row in rows)
-    reflected, transmitted = (lobes[:-1], lobes[-1]) if stack.transmits else (lobes, None)
+    reflected, transmitted = (lobes[:-1], lobes[-1:]) if stack.transmits else (lobes, ())
     light = np.stack([grid for _, grid in columns], axis=1)
     return Account(reflected, transmitted, light.sum(axis=(2, 3)), light, remainder)
 

@@ -20,7 +20,7 @@ from velatura.errors import InvalidInput
 from velatura.model import MODELS
 from velatura.optics.directions import directions
 from velatura.reference import WalkedLobe
-from velatura.stack import Stack
+from velatura.stack import Described
 from velatura.stack.schema import unknown
 
 #: A plugin by name, with Mitsuba's defaults; the XML file of a BSDF; or its parameters as `mi.load_dict` takes them.
@@ -37,8 +37,8 @@ def name_of(plugin: Plugin) -> str:
     return Path(plugin).stem if _is_file(plugin) else str(plugin)
 
 
-def made(plugin: Plugin, stack: Stack, microsurface: bool) -> Any:
-    """The `mi.BSDF`; Velatura's own plugins are given the stack.
+def made(plugin: Plugin, material: Described, microsurface: bool) -> Any:
+    """The `mi.BSDF`; Velatura's own plugins are given the material.
 
     Raises:
         InvalidInput: no such plugin, none for BSDFs, or one that holds others, without which Mitsuba may crash; what
@@ -49,7 +49,7 @@ def made(plugin: Plugin, stack: Stack, microsurface: bool) -> Any:
     if not mi.is_rgb or mi.variant().startswith("scalar"):
         raise InvalidInput(f"models: plugins are compared in llvm_ad_rgb or the like, not in {mi.variant()}")
     if isinstance(plugin, str) and plugin in api.PLUGINS:
-        return api.bsdf(stack, plugin, **({"microsurface": microsurface} if plugin == "reference" else {}))
+        return api.bsdf(material, plugin, **({"microsurface": microsurface} if plugin == "reference" else {}))
     if not plugin:
         raise InvalidInput("models: a name is empty")
     try:
@@ -92,7 +92,7 @@ def _from_type(mi: Any, plugin: Any) -> Any:
     return kernel.load_dict(fields)
 
 
-def account(bsdf: Any, stack: Stack, cos_theta: Sequence[float]) -> Account:
+def account(bsdf: Any, material: Described, cos_theta: Sequence[float]) -> Account:
     """The distribution of the light of a BSDF, by its own sampling; its lobes are unknown, and NaN."""
     probe, rng = Probe(bsdf), np.random.default_rng(0)
     grids = []
@@ -100,17 +100,19 @@ def account(bsdf: Any, stack: Stack, cos_theta: Sequence[float]) -> Account:
         drawn = probe.sample(np.broadcast_to(wi, (SAMPLES, 3)), rng.random((SAMPLES, 3)))
         up = drawn.wo[:, 2] > 0
         grids.append(distribution(LightPoints(drawn.wo[up, :2].T, drawn.weight[up].T / SAMPLES)))
-    return without_lobes(stack, np.stack(grids, axis=1))
+    return without_lobes(material, np.stack(grids, axis=1))
 
 
-def without_lobes(stack: Stack, grid: NDArray[np.floating]) -> Account:
+def without_lobes(material: Described, grid: NDArray[np.floating]) -> Account:
     """An account of a distribution (3, N, bins, bins) alone."""
 
     def nothing(*shape: int) -> NDArray[np.floating]:
         return np.full((*shape, grid.shape[1]), np.nan)
 
     lobe = WalkedLobe(energy=nothing(3), alpha=nothing(2), rotation=nothing(), mean=nothing(2), covariance=nothing(3))
-    return Account((lobe,) * len(stack.surfaces), lobe if stack.transmits else None, grid.sum(axis=(2, 3)), grid)
+    surfaces = sum(len(stack.surfaces) for _, stack in material.leaves())
+    passing = sum(stack.transmits for _, stack in material.leaves())
+    return Account((lobe,) * surfaces, (lobe,) * passing, grid.sum(axis=(2, 3)), grid)
 
 
 def _is_file(plugin: Plugin) -> bool:

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
 
@@ -29,16 +29,16 @@ _FIELDS = {"energy": True, "alpha": True, "rotation": False, "mean": True, "cova
 class Account:
     """The distribution of light for N directions of incidence, by a model or by the truth.
 
-    reflected: lobes by the deepest interface from the top, a diffuse base last (NaN of a plugin, which has no
-    lobes); transmitted: the light that leaves below, or None. Their mean and covariance are those of the outgoing
-    directions on the projected disc, and a model's alpha is that along the axes of the true lobe, wherever its own
-    `rotation` has turned them. evaluated (3, N): the integral of `eval`, which is the rendered albedo. distribution
-    (3, N, bins, bins): energies of reflected light over x and y of the projected disc. remainder (3, N): the energy of
-    reflected light in no lobe.
+    reflected: lobes by the deepest interface from the top, a diffuse base last (NaN of a plugin, which has no lobes);
+    transmitted: the light that leaves below, a lobe for each stack that transmits. Their mean and covariance are those
+    of the outgoing directions on the projected disc, and a model's alpha is that along the axes of the true lobe,
+    wherever its own `rotation` has turned them. evaluated (3, N): the integral of `eval`, which is the rendered albedo.
+    distribution (3, N, bins, bins): energies of reflected light over x and y of the projected disc. remainder (3, N):
+    the energy of reflected light in no lobe.
     """
 
     reflected: tuple[WalkedLobe, ...]
-    transmitted: WalkedLobe | None
+    transmitted: tuple[WalkedLobe, ...]
     evaluated: Array
     distribution: Array
     remainder: Array | float = 0.0
@@ -50,8 +50,22 @@ class Account:
 
     @property
     def lobes(self) -> tuple[WalkedLobe, ...]:
-        """All lobes, the transmitted one last."""
-        return self.reflected + ((self.transmitted,) if self.transmitted else ())
+        """All lobes, those transmitted last."""
+        return self.reflected + self.transmitted
+
+    @classmethod
+    def mixed(cls, shares: Sequence[float], each: Sequence[Account]) -> Account:
+        """The account of a mixture: the lobes of every stack, and sums of all light, by their shares."""
+
+        def lobes(name: str) -> tuple[WalkedLobe, ...]:
+            pairs = ((share, lobe) for share, account in zip(shares, each) for lobe in getattr(account, name))
+            return tuple(replace(lobe, energy=share * lobe.energy) for share, lobe in pairs)
+
+        def total(name: str) -> Any:
+            return sum(share * getattr(account, name) for share, account in zip(shares, each))
+
+        evaluated, distribution, remainder = map(total, ("evaluated", "distribution", "remainder"))
+        return cls(lobes("reflected"), lobes("transmitted"), evaluated, distribution, remainder)
 
 
 @dataclass(frozen=True)
@@ -75,10 +89,10 @@ class Comparison:
     """A material by the truth and by each model.
 
     name: of the material; lobe_names: "R1", "R2", ... from the top, "D" for a diffuse base, "T" for what is
-    transmitted; cos_theta: the N cosines of incidence; paths: of the truth, for each; microsurface: whether light
-    scatters many times between its facets; polarised: whether the truth's facets polarise it, with the truth that
-    leaves this out among the models, as `UNPOLARISED`; standard_error: of the truth's lobes, in their order; noise
-    (N,): the part of a total variation that is the truth's own noise.
+    transmitted, in a mixture after their part; cos_theta: the N cosines of incidence; paths: of the truth, for each;
+    microsurface: whether light scatters many times between its facets; polarised: whether the truth's facets polarise
+    it, with the truth that leaves this out among the models, as `UNPOLARISED`; standard_error: of the truth's lobes, in
+    their order; noise (N,): the part of a total variation that is the truth's own noise.
     """
 
     name: str

@@ -16,7 +16,7 @@ from velatura.comparison.result import UNPOLARISED, Account, Comparison
 from velatura.comparison.truth import truth as walked
 from velatura.errors import InvalidInput
 from velatura.model import MODELS, Model, named
-from velatura.stack import MaterialLike, Stack, single
+from velatura.stack import Described, MaterialLike, load
 
 COSINES = (1.0, 0.7, 0.35)
 PATHS = 3 * 10**6
@@ -41,7 +41,7 @@ def compare(
     Light comes in the plane of the tangent.
 
     Args:
-        stack: a material (a stack, a file, or a preset's name).
+        stack: a material (a stack, a mixture, a file, or a preset's name).
         models: names of models, or models; None means all that have the `switches`, which change the choices of each.
             Also plugins, of which only `evaluated`, the distribution and pictures are known: "weidlich_wilkie" and
             "reference", which are given the material; others of Mitsuba's, by name with its defaults ("principled"), as
@@ -61,7 +61,7 @@ def compare(
         MissingTool: LLVM is missing or too old.
     """
     # Refuse what cannot work before anything slow begins
-    described = single(stack, "compare")
+    described: Described = load(stack)
     asked = _every(switches) if models is None else [_model(m, switches) for m in models]
     if microsurface is None:
         microsurface = any(isinstance(m, Model) and m.microsurface for m in asked)
@@ -78,7 +78,8 @@ def compare(
 
     # Let the models speak, then the truth, and set them side by side
     modelled = {name: _account(m, described, cos_theta) for name, m in chosen.items()}
-    advance = _counter(progress, 3 * len(cos_theta) * (1 + polarised) + (len(chosen) + 2) * pictures)
+    walks = 3 * len(cos_theta) * len(list(described.leaves())) * (1 + polarised)
+    advance = _counter(progress, walks + (len(chosen) + 2) * pictures)
     truth, error, noise = walked(described, cos_theta, paths, seed, microsurface, polarised, advance)
     if polarised:
         modelled[UNPOLARISED], *_ = walked(described, cos_theta, paths, seed, microsurface, False, advance)
@@ -110,19 +111,20 @@ def _names(asked: Sequence[Model | Plugin], polarised: bool) -> list[str]:
     return names
 
 
-def _made(model: Model | Plugin, stack: Stack, microsurface: bool) -> Any:
+def _made(model: Model | Plugin, material: Described, microsurface: bool) -> Any:
     """The model, a bake, or the BSDF of a plugin."""
     if isinstance(model, Model):
         return model
-    return (
-        bake(stack, model) if isinstance(model, str) and model in TARGETS else plugins.made(model, stack, microsurface)
-    )
+    if isinstance(model, str) and model in TARGETS:
+        return bake(material, model)
+    return plugins.made(model, material, microsurface)
 
 
-def _account(made: Any, stack: Stack, cos_theta: Sequence[float]) -> Account:
-    if isinstance(made, Model):
-        return account(stack, cos_theta, made)
-    return (baked if isinstance(made, Bake) else plugins).account(made, stack, cos_theta)
+def _account(made: Any, material: Described, cos_theta: Sequence[float]) -> Account:
+    if not isinstance(made, Model):
+        return (baked if isinstance(made, Bake) else plugins).account(made, material, cos_theta)
+    shares, stacks = zip(*material.weighted("lobes are those of one point; replace it by a number"))
+    return Account.mixed(shares, [account(stack, cos_theta, made) for stack in stacks])
 
 
 def _model(model: Model | Plugin, switches: dict[str, str]) -> Model | Plugin:
@@ -149,12 +151,17 @@ def _beside(model: Account, truth: Account) -> Account:
     """The model's account with its roughness along the axes of the true lobes."""
     turned = [along(lobe, true) for lobe, true in zip(model.lobes, truth.lobes)]
     split = len(model.reflected)
-    return replace(model, reflected=tuple(turned[:split]), transmitted=turned[split] if model.transmitted else None)
+    return replace(model, reflected=tuple(turned[:split]), transmitted=tuple(turned[split:]))
 
 
-def _lobe_names(stack: Stack) -> tuple[str, ...]:
-    names = [f"R{k}" for k in range(1, len(stack.interfaces) + 1)]
-    return (*names, *(["D"] if stack.base else []), *(["T"] if stack.transmits else []))
+def _lobe_names(material: Described) -> tuple[str, ...]:
+    reflected, transmitted = [], []
+    for path, stack in material.leaves():
+        part = "".join(f"part{number} " for number in path)
+        reflected += [f"{part}R{k}" for k in range(1, len(stack.interfaces) + 1)]
+        reflected += [f"{part}D"] if stack.base else []
+        transmitted += [f"{part}T"] if stack.transmits else []
+    return (*reflected, *transmitted)
 
 
 def _counter(progress: Progress | None, total: int) -> Callable[[], None]:

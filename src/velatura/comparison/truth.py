@@ -11,13 +11,13 @@ from numpy.typing import NDArray
 from velatura import reference
 from velatura.comparison.result import Account
 from velatura.reference import WalkedLobe
-from velatura.stack import Stack
+from velatura.stack import Described, Stack
 
 Array = NDArray[np.floating]
 
 
 def truth(
-    stack: Stack,
+    material: Described,
     cos_theta: Sequence[float],
     paths: int,
     seed: int,
@@ -27,11 +27,35 @@ def truth(
 ) -> tuple[Account, tuple[WalkedLobe, ...], Array]:
     """The truth's account, the standard errors of its lobes, and the noise of its distribution as a total variation.
 
-    Arguments are those of `compare`; `advance` is called three times for each direction.
+    Arguments are those of `compare`; `advance` is called three times for each direction and stack.
 
     Raises:
         InvalidInput, MissingTool: as `reference.statistics`.
     """
+    shares, stacks = zip(*material.weighted("lobes are those of one point; replace it by a number"))
+    found = [_walked(stack, cos_theta, paths, seed, microsurface, polarised, advance) for stack in stacks]
+    accounts, errors, halves = zip(*found)
+
+    # Half the difference of two halves is as noisy as their mean
+    grids = np.tensordot(shares, halves, 1)  # (N, 2, 3, bins, bins)
+    mean = grids.mean(axis=1)
+    apart = 0.5 * np.abs((grids[:, 0] - grids[:, 1]).mean(axis=1))
+    noise = 0.5 * apart.sum(axis=(1, 2)) / np.maximum(mean.mean(axis=1).sum(axis=(1, 2)), 1e-12)
+
+    return Account.mixed(shares, accounts), Account.mixed(shares, errors).lobes, noise
+
+
+def _walked(
+    stack: Stack,
+    cos_theta: Sequence[float],
+    paths: int,
+    seed: int,
+    microsurface: bool,
+    polarised: bool,
+    advance: Callable[[], None],
+) -> tuple[Account, Account, Array]:
+    """The account of one stack, another one with the standard errors of its lobes, and distributions of two halves of
+    the paths, (N, 2, 3, bins, bins)."""
     # One direction at a time, so that progress is reported and memory is bounded
     each, halves = [], []
     for cosine in cos_theta:
@@ -45,24 +69,15 @@ def truth(
             pair.append(found.reflected[:, 0])
             advance()
         halves.append(pair)
-
-    # Half the difference of two halves is as noisy as their mean
-    grids = np.array(halves)  # (N, 2, 3, bins, bins)
-    mean = grids.mean(axis=1)
-    apart = 0.5 * np.abs((grids[:, 0] - grids[:, 1]).mean(axis=1))
-    noise = 0.5 * apart.sum(axis=(1, 2)) / np.maximum(mean.mean(axis=1).sum(axis=(1, 2)), 1e-12)
-
+    grids = np.array(halves)
     reflected, transmitted = _joined(each)
-    errors, below = _joined([s.standard_error for s in each if s.standard_error])
     evaluated = np.sum([lobe.energy for lobe in reflected], axis=0)
-    return (
-        Account(reflected, transmitted, evaluated, mean.swapaxes(0, 1)),
-        (*errors, *([below] if below else [])),
-        noise,
-    )
+    mean = grids.mean(axis=1).swapaxes(0, 1)
+    errors = _joined([s.standard_error for s in each if s.standard_error])
+    return Account(reflected, transmitted, evaluated, mean), Account(*errors, 0 * evaluated, 0 * mean), grids
 
 
-def _joined(each: Sequence[reference.Statistics]) -> tuple[tuple[WalkedLobe, ...], WalkedLobe | None]:
+def _joined(each: Sequence[reference.Statistics]) -> tuple[tuple[WalkedLobe, ...], tuple[WalkedLobe, ...]]:
     """Lobes over all directions, from statistics of single ones."""
     names = [field.name for field in fields(WalkedLobe)]
     reflected = tuple(
@@ -71,4 +86,4 @@ def _joined(each: Sequence[reference.Statistics]) -> tuple[tuple[WalkedLobe, ...
     )
     below = [s.transmitted for s in each if s.transmitted]
     transmitted = {name: np.concatenate([getattr(lobe, name) for lobe in below], axis=-1) for name in names if below}
-    return reflected, WalkedLobe(**transmitted) if below else None
+    return reflected, (WalkedLobe(**transmitted),) if below else ()

@@ -125,10 +125,11 @@ class Mix(Record):
         from velatura.ops import divide, maximum  # loads NumPy, which files do not need
 
         own = [weights[f"part{index}_weight"] for index in range(len(self.mix) - 1)]
-        total = sum(own, 0.0)
-        own = [divide(weight, maximum(total, 1.0)) for weight in own] if len(own) > 1 else own
+        if len(own) > 1:
+            most = maximum(sum(own), 1.0)
+            own = [divide(weight, most) for weight in own]
         found: list[Any] = []
-        for index, (part, share) in enumerate(zip(self.mix, [*own, maximum(1 - total, 0.0)])):
+        for index, (part, share) in enumerate(zip(self.mix, [*own, 1.0 - sum(own)])):
             within_part = {name: value for number, name, value in _by_part(weights) if number == index}
             found += [share * other for other in part.material.shares(within_part)]
         return found
