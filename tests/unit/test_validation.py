@@ -46,7 +46,7 @@ def test_values_of_slabs_are_those_of_disort(form: str) -> None:
     errors = np.array([slab_radiances.errors(case, form) for case in some])
     most = {"Rayleigh": 0.015, "g 0": 0.015, "g 0.5": 0.03, "g 0.8": 0.07, "g 0.9": 0.12}
     assert np.all(errors.max(axis=1) < [most[case.name] for case in some])
-    assert np.all(errors.mean(axis=0) < 0.03)
+    assert np.all(errors.mean(axis=0) < (0.035, 0.02))
 
 
 def test_media_are_as_the_page_has_them() -> None:

@@ -150,9 +150,7 @@ class Material:
     @property
     def below(self) -> Value:
         """Index of the medium below a material that transmits."""
-        last = self.layers[-1]
-        assert isinstance(last, InterfaceValues)
-        return self.exterior if self.thin else last.eta
+        return self.exterior if self.thin else self.interfaces[-1].eta
 
     def with_layer(self, n: int, **values: Value) -> Material:
         """The material with values of its n-th layer changed; an index that is, was not measured."""
