@@ -16,7 +16,7 @@ directions are turned up, indices relative to it.
 from __future__ import annotations
 
 import operator
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import reduce
 from math import pi
@@ -36,6 +36,7 @@ from velatura.model.solved.transmission.direct import (
     WIDTHS,
     CrossedSlab,
     MomentumInSlabs,
+    Refraction,
     Transmission,
     entered,
     is_none,
@@ -135,25 +136,32 @@ def _lobe(transmission: Transmission, i: MomentumInSlabs, under: Sequence[Value]
         )
     u, v, rotation = inside.roughness(WIDTHS)
     roughness = Roughness(ops.minimum(u, INTERNAL_ALPHA_MAX), ops.minimum(v, INTERNAL_ALPHA_MAX), rotation)
-    return RefractedLobe(1.0, roughness, n / transmission.indices[-1], leaving=_leaving(transmission, under))
+    return RefractedLobe(
+        1.0,
+        roughness,
+        n / transmission.indices[-1],
+        leaving=_Outlet(transmission.indices, transmission.refractions, under),
+    )
 
 
-def _leaving(transmission: Transmission, under: Sequence[Value]) -> Callable[[Value], Value]:
-    """Share (a colour) that smooth interfaces let pass, by the cosine below all of them."""
-    n, refractions = transmission.indices, transmission.refractions
+@dataclass(frozen=True)
+class _Outlet:
+    """Share (a colour) that the smooth interfaces that are `under` light let pass, by the cosine below all of them."""
 
-    def leaving(cos_o: Value) -> Value:
-        p2 = 1 - cos_o * cos_o
+    indices: Sequence[Value]
+    refractions: Sequence[Refraction]
+    under: Sequence[Value]
+
+    def __call__(self, cos_o: Value) -> Value:
+        n, p2 = self.indices, 1 - cos_o * cos_o
         passes: Value = 1.0
-        for l, (flag, refraction) in enumerate(zip(under, refractions)):
+        for l, (flag, refraction) in enumerate(zip(self.under, self.refractions)):
             if isinstance(flag, float) and flag == 0.0:
                 continue
             above, below = (ops.sqrt(1 - p2 * (n[-1] / x) * (n[-1] / x)) for x in n[l : l + 2])
-            below = cos_o if l == len(refractions) - 1 else below
+            below = cos_o if l == len(self.refractions) - 1 else below
             passes = passes * (1 - flag + flag * refraction.passing(above, below))
         return passes
-
-    return leaving
 
 
 def _above(under: Sequence[Value], values: Sequence[Value]) -> Value:
