@@ -171,7 +171,7 @@ def test_fourteen_coated_metals_share_their_kernels(mi: Any) -> None:
     import drjit as dr
 
     def kernels(alpha: float, metal: str) -> set[str]:
-        coat = [vt.Interface(eta=1.5, alpha=alpha), vt.Medium(sigma_a=(alpha, 0.1, 0.2))]
+        coat: list[Any] = [vt.Interface(eta=1.5, alpha=alpha), vt.Medium(sigma_a=(alpha, 0.1, 0.2))]
         material = vt.bsdf(vt.Stack([*coat, vt.Interface(conductor=metal, alpha=0.2)]))
         with dr.scoped_set_flag(dr.JitFlag.KernelHistory):
             dr.kernel_history_clear()

@@ -198,6 +198,7 @@ def _kernel(
     import drjit as dr
 
     number, integer = module.Float64, module.UInt32
+    whole: Any = dr.int_array_t(number)
     own = [x.ndim > 1 for x in samples]
 
     def launch(
@@ -215,7 +216,7 @@ def _kernel(
             more = found(k)
             for light, parts in zip(more.deposits, outs):
                 values = [value * wave for value in light.values for wave in light.waves]
-                first = dr.int_array_t(number)(light.first)
+                first = whole(light.first)
                 for j, share in enumerate(light.shares):
                     row = dr.select(first < 0, last, integer(first)) if j == 0 else integer(first + j)
                     for (begin, part), out in zip(_packets(len(values)), parts):
@@ -320,10 +321,11 @@ def _kind(value: Any, flat: list[float]) -> Hashable:
         return value
     if isinstance(value, MethodType):
         return value.__name__, _kind(value.__self__, flat)
-    names = _fields(type(value))
+    kind: Any = type(value)
+    names = _fields(kind)
     if names is None:
         raise _Foreign
-    return type(value), *[_kind(getattr(value, name), flat) for name in names]
+    return kind, *[_kind(getattr(value, name), flat) for name in names]
 
 
 @functools.lru_cache(maxsize=256)
