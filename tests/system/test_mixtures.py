@@ -298,7 +298,7 @@ def test_walks_through_a_mixture_agree_with_its_lobes_and_with_the_plugin() -> N
     si = dr.zeros(mi.SurfaceInteraction3f)
     si.wi = mi.Vector3f(0.51**0.5, 0, 0.7)
     assert np.allclose(np.array(vt.bsdf(mix).eval_diffuse_reflectance(si)), total, atol=0.002)
-    walks = vt.bsdf(mix, "reference")
+    walks = vt.bsdf(mix, "reference", microsurface=True)
     many = dr.gather(mi.SurfaceInteraction3f, si, dr.zeros(mi.UInt32, 2**18))
     u = RNG.random((3, 2**18))
     _, weight = walks.sample(context(), many, mi.Float(u[0]), mi.Point2f(u[1:]))

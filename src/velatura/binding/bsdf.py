@@ -138,10 +138,11 @@ def plugin_class(mi: Any) -> type:
                 return bs, weight
 
             # Evaluate all at once; a smooth one has a probability and a weight of its own
+            lit = _lit(shares, active)
             if all(own):
-                pdf = _total(chances, [point.pdf(bs.wo, active) for point in each])
+                pdf = _total(chances, [point.pdf(bs.wo, here) for point, here in zip(each, lit)])
             else:
-                values, densities = zip(*(point.eval_pdf(bs.wo, active) for point in each))
+                values, densities = zip(*(point.eval_pdf(bs.wo, here) for point, here in zip(each, lit)))
                 pdf = _total(chances, densities)
                 weight = dr.select(given, weight, _total(shares, values) / dr.maximum(pdf, 1e-30))
                 # A direction that its stack has lost, below a horizon, is none of the others'
@@ -153,15 +154,15 @@ def plugin_class(mi: Any) -> type:
 
         def eval(self, ctx: Any, si: Any, wo: Any, active: Any = True) -> Any:
             each, shares, _ = self._each(ctx, si, active)
-            return _total(shares, [point.eval(wo, active) for point in each])
+            return _total(shares, [point.eval(wo, lit) for point, lit in zip(each, _lit(shares, active))])
 
         def pdf(self, ctx: Any, si: Any, wo: Any, active: Any = True) -> Any:
             each, _, chances = self._each(ctx, si, active)
-            return _total(chances, [point.pdf(wo, active) for point in each])
+            return _total(chances, [point.pdf(wo, lit) for point, lit in zip(each, _lit(chances, active))])
 
         def eval_pdf(self, ctx: Any, si: Any, wo: Any, active: Any = True) -> tuple[Any, Any]:
             each, shares, chances = self._each(ctx, si, active)
-            values, densities = zip(*(point.eval_pdf(wo, active) for point in each))
+            values, densities = zip(*(point.eval_pdf(wo, lit) for point, lit in zip(each, _lit(shares, active))))
             return _total(shares, values), _total(chances, densities)
 
         def eval_diffuse_reflectance(self, si: Any, active: Any = True) -> Any:
@@ -242,6 +243,15 @@ def _chosen(mi: Any, u: Any, chances: Sequence[Any]) -> tuple[Any, Any]:
         )
         end = end + chance
     return which, dr.clip((u - begin) / dr.maximum(width, 1e-30), 0, BELOW_ONE)
+
+
+def _lit(shares: Sequence[Any], active: Any) -> list[Any]:
+    """Where stacks are to be evaluated: where they have a share, or all over if that is differentiated."""
+    import drjit as dr
+
+    if len(shares) == 1:
+        return [active]
+    return [active if dr.grad_enabled(share) else active & (share > 0) for share in shares]
 
 
 def _total(shares: Sequence[Any], values: Sequence[Any]) -> Any:

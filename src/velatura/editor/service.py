@@ -48,6 +48,7 @@ from velatura.stack import (
     preset,
     presets,
     rgb,
+    single,
     substances,
 )
 from velatura.stack.layers import LAYERS, LayerRecord, has
@@ -233,7 +234,8 @@ def table(body: Body) -> Answer:
 def read(body: Body) -> Answer:
     """The material in a text, YAML or JSON; errors name the file that it was in."""
     name = field(body, "file", str, "the text")
-    return {"material": document(loads(field(body, "text", str), name if name.isprintable() else repr(name)))}
+    material = loads(field(body, "text", str), name if name.isprintable() else repr(name))
+    return {"material": document(single(material, "the editor"))}
 
 
 def write(body: Body) -> Answer:

@@ -13,7 +13,7 @@ from pydantic import model_validator
 from velatura.errors import InvalidInput, within
 from velatura.model.roughness_maps import MAPS, RoughnessMap
 from velatura.model.variance import Covariance, Isotropic, PerAxis, Roughness, Variance
-from velatura.stack import RGB, Stack, io
+from velatura.stack import RGB, Mix, Stack, io, single
 from velatura.stack.schema import Parameter, Record, show
 from velatura.stack.values import INDEX_HIGH, INDEX_LOW, Choice, Colour, Film, Films, Pair, Scalar, Text, Whole
 
@@ -57,12 +57,10 @@ class Start(Parameter):
         return "a material"
 
     def check(self, value: Any) -> Stack:
-        if isinstance(value, Stack):
-            return value
-        if not isinstance(value, Mapping):
+        if not isinstance(value, Stack | Mix | Mapping):
             raise self.refuse(value)
         try:
-            return Stack.from_dict(value)
+            return single(value, "the inverse")
         except InvalidInput as error:
             raise ValueError(str(error)) from None
 
