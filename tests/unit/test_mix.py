@@ -204,6 +204,10 @@ def test_names_of_parts_that_are_not_there_are_refused() -> None:
         with pytest.raises(vt.InvalidInput) as caught:
             WORN.replace(**values)
         assert line in str(caught.value)
+    for values in ({"part0_" * 500 + "layer0_eta": 1.4}, {"part1_layer0_eta": 1.4}, {"part0_weight": 0.5}):
+        with pytest.raises(vt.InvalidInput):
+            vt.Mix.from_flat(values)
+    assert addressed("part0_" * 500 + "layer0_eta") == ()
 
 
 def test_the_schema_knows_mixtures() -> None:

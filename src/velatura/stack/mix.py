@@ -27,7 +27,7 @@ ROUNDING = 1e-6  # by which the sum of all weights may differ from 1
 
 WEIGHT = Scalar("share of the surface; the last part has what the others leave", low=0, high=1, typical=0.0)
 
-_PART = re.compile(r"part(\d{1,4})_(\w+)")
+_PART = re.compile(rf"(?!(?:part\d+_){{{DEEPEST + 1}}})part(\d{{1,4}})_(\w+)")  # not deeper than mixtures are
 
 
 class MaterialRecord(Parameter):
