@@ -44,7 +44,7 @@ TILT = 8.0  # degrees, of instruments whose sphere takes in what the surface ref
 READING = 1e-3  # standard error of a reading, of which intervals are reported
 HIDDEN = 3.0  # depth of a film of which nothing shows through, in lengths of diffusion
 RANGE = 1e-5, 1e5  # of K and S times the depth of a film
-STEP = 1e-3  # of logarithms, for derivatives
+STEP = 1e-3  # of logarithms, and relative to concentrations, for derivatives
 MEASURED = "wavelength_nm", "black", "white"  # columns of a file
 VISIBLE_NM = 380.0, 730.0  # of which colours are made
 PULL = 1e-3  # towards the first guess, in units of colour difference: decides what the wish leaves open
@@ -420,16 +420,19 @@ def paint(
 
 @dataclass(frozen=True)
 class _Seen:
-    """A material and its pigments in channels, those of sRGB or at wavelengths `nm`, and the wish.
+    """A material and its pigments in channels, those of sRGB or wavelengths, and the wish.
 
-    `k` and `s` are (P, C), of pigments at a concentration of 1.
+    Attributes:
+        material: of NumPy's values, regardless of the concentrations.
+        k, s: (P, C), of pigments at a concentration of 1.
+        weights: (3, C), of channels in linear sRGB.
+        wished: linear sRGB (3,), or reflectances (C,) if the wish is `spectral`.
     """
 
     material: Material
     k: Array
     s: Array
-    nm: Array | None
-    weights: Array  # (3, C), of channels in linear sRGB
+    weights: Array
     wished: Array
     spectral: bool
 
@@ -456,7 +459,7 @@ class _Seen:
 
         k, s = (np.array([channels(each.coefficients[part]) for each in pigments]) for part in (0, 1))
         material = Material.of(stack) if nm is None else at_wavelengths(stack, nm)
-        return cls(material, k, s, nm, weights, wished, is_table)
+        return cls(material, k, s, weights, wished, is_table)
 
     def rgb(self, reflected: Array) -> Array:
         """Reflectances by channels as linear sRGB under D65."""
@@ -473,14 +476,14 @@ class _Seen:
         from scipy import optimize
 
         first = self.material.layers[0]
-        eta = float(np.mean(first.eta)) if isinstance(first, InterfaceValues) and first.kind == "dielectric" else 1.0
-        inside = np.clip(
-            kubelka_munk.below(self.wished + kubelka_munk.surface(max(eta, 1.0))[0], max(eta, 1.0)), 0.01, 0.99
-        )
+        refracts = isinstance(first, InterfaceValues) and first.kind == "dielectric"
+        eta = _index(self.material) if refracts else 1.0
+        inside = kubelka_munk.below(self.wished + kubelka_munk.surface(eta)[0], eta)
+        ratio = kubelka_munk.ratio(np.clip(inside, 0.01, 0.99))
         reduced = np.eye(len(self.wished)) if self.spectral else self.weights
         k, s = (np.maximum(each @ reduced.T, 0) for each in (self.k, self.s))
         # The sum of c (K - q S) is 0, and that of c as wished
-        rows = (k - kubelka_munk.ratio(inside) * s) / np.maximum(k + kubelka_munk.ratio(inside) * s, 1e-9).max(axis=0)
+        rows = (k - ratio * s) / np.maximum(k + ratio * s, 1e-9).max(axis=0)
         sum_ = total if total is not None else min(0.5 * most * len(k), 1.0)
         system = np.vstack([rows.T, np.ones(len(k))])
         wanted = np.append(np.zeros(rows.shape[1]), sum_)
