@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 from collections.abc import Callable
 from dataclasses import dataclass, is_dataclass, replace
 from functools import partial
@@ -47,9 +48,17 @@ def _spectrum(mi: Any, *channels: Any) -> Any:
 
 def _plain(value: Any) -> Any:
     """All values in records, as lists: Dr.Jit passes named tuples over."""
-    if is_dataclass(value) and not isinstance(value, type):
-        return [_plain(each) for each in vars(value).values()]
-    return [_plain(each) for each in value] if isinstance(value, tuple | list) else value
+    kind = type(value)
+    if kind is float:
+        return value
+    if issubclass(kind, tuple | list):
+        return [_plain(each) for each in value]
+    return [_plain(each) for each in vars(value).values()] if _is_record(kind) else value
+
+
+@functools.lru_cache(maxsize=256)
+def _is_record(kind: type) -> bool:
+    return is_dataclass(kind)
 
 
 def of(mi: Any, binding: Binding, model: Model, variance: type[Variance], before: Bodies | None) -> Bodies:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import sys
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
@@ -110,7 +111,20 @@ class Summed:
 
 
 def directions(shape: tuple[int, ...], number: type | None) -> Direction:
-    """Directions at nodes, by Dr.Jit's type of numbers (None for NumPy). Shape: (cosines,) or (cosines, azimuths)."""
+    """Directions at nodes, by Dr.Jit's type of numbers (None for NumPy, not to be written to). Shape: (cosines,) or
+    (cosines, azimuths)."""
+    return _in_numpy(shape) if number is None else _directions(shape, number)
+
+
+@functools.lru_cache(maxsize=16)
+def _in_numpy(shape: tuple[int, ...]) -> Direction:
+    found = _directions(shape, None)
+    for each in found:
+        each.flags.writeable = False
+    return found
+
+
+def _directions(shape: tuple[int, ...], number: type | None) -> Direction:
     index, real = integers(prod(shape), number)
     turns = prod(shape[1:])
     return direction(real(index // turns) / (shape[0] - 1), real(index % turns) / max(turns - 1, 1))

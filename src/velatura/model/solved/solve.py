@@ -568,7 +568,7 @@ class Solver:
 
     def _integral(self, shape: Shape, numbers: Sequence[Array], wi: Direction) -> Array:
         lobe = shape.lobe(1.0, self.kind(*numbers).roughness(ROOTS))
-        return refracted_lobe.integrals(lobe, wi, BETWEEN[self.isotropic])[0]
+        return refracted_lobe.integral(lobe, wi, BETWEEN[self.isotropic])
 
     def _colours(self, values: Array) -> Array:
         return np.broadcast_to(values, (self.colours, np.shape(values)[-1]))

@@ -7,6 +7,7 @@ any length goes to the four nodes about it by Lagrange's polynomials, which keep
 
 from __future__ import annotations
 
+import functools
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
@@ -128,7 +129,14 @@ class Nodes:
         return start + of_part(6), [-t_1 * outer, 3 * t * outer, -inner * t_3, inner * t_2 / 3]
 
     def weights(self, n: float) -> Array:
-        """Integrals over p^2 in [0, n^2] of the functions that light is shared by, (N,)."""
-        p2 = (np.arange(QUADRATURE) + 0.5) / QUADRATURE * n * n
-        index, shares, _ = self.shares(np.sqrt(p2))
-        return np.bincount(index.ravel(), shares.ravel(), self.count) * (n * n / QUADRATURE)
+        """Integrals over p^2 in [0, n^2] of the functions that light is shared by, (N,); not to be written to."""
+        return _weights(self, n)
+
+
+@functools.lru_cache(maxsize=256)
+def _weights(nodes: Nodes, n: float) -> Array:
+    p2 = (np.arange(QUADRATURE) + 0.5) / QUADRATURE * n * n
+    index, shares, _ = nodes.shares(np.sqrt(p2))
+    found = np.bincount(index.ravel(), shares.ravel(), nodes.count) * (n * n / QUADRATURE)
+    found.flags.writeable = False
+    return found

@@ -129,6 +129,7 @@ class _Coat:
             return _Outlet(self.n, self.n_below / self.n)
         return lambda cos_theta: np.asarray(ops.mean(self.facets.passing(_cosine(cos_theta, self.n, 0.0))))
 
+    @functools.cached_property
     def moved(self) -> Tensor:
         """Displacement of momentum in a refraction."""
         x, y = (
@@ -209,7 +210,7 @@ def tensors(found: Sequence[Part], cos_theta: Array, phi: Array, energies: Array
 
 
 def _first_order(own: Tensor, coats: Sequence[_Coat], n: float, cosine: Array) -> Tensor:
-    moved = [coat.moved() for coat in coats]
+    moved = [coat.moved for coat in coats]
 
     def total(x: Array, y: Array) -> Tensor:
         both_ways = [each.stretched(0.5 / (n * x), 0.5 / (n * y)) for each in moved] * 2
