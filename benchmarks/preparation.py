@@ -2,9 +2,9 @@
 
     python benchmarks/preparation.py [--rounds 15]
 
-One roughness of a preset is changed, the BSDF is made and evaluated once. Seconds of the clock, and as a remark of the
-processor, without the first two changes, which compile; then the same for three interfaces of every kind, by
-`velatura`, where facets are met once, and often.
+One roughness of a preset is changed (of an isotropic interface along both axes), the BSDF is made and evaluated once.
+Seconds of the clock, and as a remark of the processor, without the first two changes, which compile; then the same for
+three interfaces of every kind, by `velatura`, where facets are met once, and often.
 """
 
 from __future__ import annotations
@@ -63,10 +63,12 @@ WO = np.array([[-0.6, 0.0, 0.8]])
 
 
 def report(label: str, stack: Stack, choices: dict[str, Any], rounds: int) -> None:
-    name = next(name for name in stack.flat() if "_alpha" in name)
+    flat = stack.flat()
+    u, v, *_ = (name for name in flat if "_alpha" in name)
+    names = [u, v] if flat[u] == flat[v] else [u]
     spent = []
     for i in range(rounds + 2):
-        changed = stack.replace(**{name: 0.05 + 0.3 * i / rounds})
+        changed = stack.replace(**dict.fromkeys(names, 0.05 + 0.3 * i / rounds))
         processor, clock = time.process_time(), time.perf_counter()
         Probe(vt.bsdf(changed, **choices)).eval_pdf(WI, WO)
         spent.append((time.process_time() - processor, time.perf_counter() - clock))

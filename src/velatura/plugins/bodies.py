@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import functools
 from collections.abc import Callable
 from dataclasses import dataclass, is_dataclass, replace
 from functools import partial
@@ -53,12 +52,7 @@ def _plain(value: Any) -> Any:
         return value
     if issubclass(kind, tuple | list):
         return [_plain(each) for each in value]
-    return [_plain(each) for each in vars(value).values()] if _is_record(kind) else value
-
-
-@functools.lru_cache(maxsize=256)
-def _is_record(kind: type) -> bool:
-    return is_dataclass(kind)
+    return [_plain(each) for each in vars(value).values()] if is_dataclass(kind) else value
 
 
 def of(mi: Any, binding: Binding, model: Model, variance: type[Variance], before: Bodies | None) -> Bodies:

@@ -198,7 +198,6 @@ def _kernel(
     import drjit as dr
 
     number, integer = module.Float64, module.UInt32
-    whole: Any = dr.int_array_t(number)
     own = [x.ndim > 1 for x in samples]
 
     def launch(
@@ -216,7 +215,7 @@ def _kernel(
             more = found(k)
             for light, parts in zip(more.deposits, outs):
                 values = [value * wave for value in light.values for wave in light.waves]
-                first = whole(light.first)
+                first = module.Int64(light.first)
                 for j, share in enumerate(light.shares):
                     row = dr.select(first < 0, last, integer(first)) if j == 0 else integer(first + j)
                     for (begin, part), out in zip(_packets(len(values)), parts):
@@ -321,11 +320,11 @@ def _kind(value: Any, flat: list[float]) -> Hashable:
         return value
     if isinstance(value, MethodType):
         return value.__name__, _kind(value.__self__, flat)
-    kind: Any = type(value)
-    names = _fields(kind)
+    own: Any = type(value)
+    names = _fields(own)
     if names is None:
         raise _Foreign
-    return kind, *[_kind(getattr(value, name), flat) for name in names]
+    return own, *[_kind(getattr(value, name), flat) for name in names]
 
 
 @functools.lru_cache(maxsize=256)
