@@ -94,6 +94,19 @@ def test_a_medium_on_top_is_the_model_in_every_language(name: str, layers: list[
     assert max(apart.value, apart.density) < 1e-3
 
 
+def test_a_program_of_dust_on_glass_draws_fog() -> None:
+    """Expected: given the values and the solution of a medium alone, which passes light of another shape."""
+    if why := MACHINES["wgsl"].missing():
+        pytest.skip(why)
+    program = Changeable.of(vt.Stack([FOG, vt.Interface(eta=1.5, alpha=0.1)]), MACHINES["wgsl"])
+    for layers in ([FOG, AIR], [vt.Medium(sigma_s=0.9, phase="rayleigh"), vt.Interface(eta=1.3, alpha=0.2)]):
+        stack = vt.Stack(layers)
+        case = Case(stack, {}, random_case((stack.kinds, "round"), 60, np.random.default_rng(7)).directions)
+        truth, found = in_numpy(case, program.recording), program.given(case)
+        alike = (replace(each, alpha=0 * truth.alpha + 1) for each in (truth, found))
+        assert differences(*alike).value < 1e-3
+
+
 @pytest.mark.parametrize("name", MACHINES)
 def test_a_wrong_constant_is_seen(name: str) -> None:
     """The comparison can fail: a shader of a slightly other material differs by more than the bounds."""

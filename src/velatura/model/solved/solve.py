@@ -670,11 +670,11 @@ def layout_of(materials: Sequence[Material], veiled: Set[int] = frozenset()) -> 
     cloudy = sorted(set().union(*map(_cloudy, materials)))
     stepped = widths.stepped(steps)
     last, top = rough[-1] if rough else None, _top(materials, stepped)
-    alone = top is not None and not stepped and _has_one_medium(materials[0])
+    alone = top is not None and not stepped and has_one_medium(materials[0])
     return Layout(lobes, stepped, last, cloudy, media_of(materials[0]), top, top is not None, alone)
 
 
-def _has_one_medium(material: Material) -> bool:
+def has_one_medium(material: Material) -> bool:
     """Whether a material transmits, and has one medium and no films."""
     slabs = sum(isinstance(layer, SlabValues) for layer in material.layers)
     return material.transmits and slabs == 1 and not any(material.films)

@@ -28,7 +28,7 @@ from velatura.model.solved.bsdf import Side, Solved
 from velatura.model.solved.columns import Columns
 from velatura.model.solved.lobes import top_medium
 from velatura.model.solved.lobes.remainder import Remainder
-from velatura.model.solved.lobes.top_medium import TopMedium
+from velatura.model.solved.lobes.top_medium import PassedMedium, TopMedium
 from velatura.model.solved.rotation_frame import Frame, Turned
 from velatura.model.solved.solve import Layout, SolvedSide, Solver
 from velatura.model.solved.transmission import direct
@@ -146,7 +146,8 @@ class SolvedLookUp(LookUp):
             found = solver.solve(material, own)
         texels = _texture(_rows(solver, found), self.places, self.groups, self.nodes)
         degrees = None if self.angle is None else frame.degrees(numbers)
-        return SolvedContents(texels, _remainders(found), _layout_numbers(solver, material, own, degrees))
+        numbers_of_layout = _layout_numbers(solver, material, own, self.layouts, degrees)
+        return SolvedContents(texels, _remainders(found, _colours_of(self.layouts[0])), numbers_of_layout)
 
 
 def tabulated(stack: Stack, material: Material, model: Model, variance: type[Variance], general: bool) -> SolvedLookUp:
@@ -162,6 +163,8 @@ def tabulated(stack: Stack, material: Material, model: Model, variance: type[Var
     solver = Solver.of(model, variance, Context(), None if general else plain)
     solver = replace(solver, phase_of=_of_numbers if general else _printed)
     layouts = solver.layouts([_eventful(plain) if general else plain])
+    if general and layouts[0].apart and solve.has_one_medium(plain):
+        layouts = [replace(layout, alone=True) for layout in layouts]
     found = None if general else solver.solve(plain, layouts)
     rows = None if found is None else _rows(solver, found)
     sides, of_side = [], _colours_of(layouts[0])
@@ -170,8 +173,13 @@ def tabulated(stack: Stack, material: Material, model: Model, variance: type[Var
         context = replace(at_a_point(), colour=together)
         side = solver.side(seen, layout, None, [*_colours(found[k])] if found else colours, context)
         if general:
-            side = replace(side, transmission=side.transmission and _any(side.transmission, flags))
-            side = replace(side, top=side.top and _any_top(seen, side.top, flags))
+            transmission = side.transmission and _any(side.transmission, flags)
+            top = side.top and _any_top(seen, side.top, flags)
+            if transmission and transmission.through and top:
+                medium = PassedMedium(**vars(top) | {"shares": transmission.through.medium.shares})
+                through = replace(transmission.through, medium=medium, is_alone=next(flags))
+                transmission = replace(transmission, through=through)
+            side = replace(side, transmission=transmission, top=top)
         sides.append(side)
     groups, places = _placed(sides[0], rows)
     for k, beam in enumerate(sides_read(len(sides), model)[: len(sides)]):
@@ -180,10 +188,10 @@ def tabulated(stack: Stack, material: Material, model: Model, variance: type[Var
     angle = None if is_same(degrees, 0.0) else degrees * (pi / 180)
     solved = None
     if found is not None and rows is not None:
-        layout_numbers = _layout_numbers(solver, plain, layouts, None if angle is None else degrees)
+        layout_numbers = _layout_numbers(solver, plain, layouts, layouts, None if angle is None else degrees)
         solved = SolvedContents(_texture(rows, places, groups, solver.shape), _remainders(found), layout_numbers)
     flagged = sum(len(_flags(side.transmission)) for side in sides if side.transmission)
-    flagged += sum(OF_TOP for side in sides if side.top)
+    flagged += sum(OF_TOP for side in sides if side.top) + sum(layout.alone for layout in layouts)
     return SolvedLookUp(
         nodes=solver.shape,
         groups=groups,
@@ -206,18 +214,22 @@ def _texture(rows: Array, places: Sequence[int | float], groups: Sequence[Group]
     return texture(placed, groups, rows.shape[1], nodes)
 
 
-def _remainders(found: Sequence[SolvedSide]) -> Array:
-    """Colours of the remainders of all sides."""
-    return np.concatenate(list(map(_colours, found)))
+def _remainders(found: Sequence[SolvedSide], count: int = 0) -> Array:
+    """Colours of the remainders of all sides, at least so many of each."""
+    each = map(_colours, found)
+    return np.concatenate([np.pad(x, ((0, max(count - len(x), 0)), (0, 0))) for x in each])
 
 
-def _layout_numbers(solver: Solver, material: Material, layouts: Sequence[Layout], degrees: Value | None) -> Array:
-    """The angle by which a material was turned back, if it may be, and the flags of its layout."""
+def _layout_numbers(
+    solver: Solver, material: Material, layouts: Sequence[Layout], kinds: Sequence[Layout], degrees: Value | None
+) -> Array:
+    """The angle by which a material was turned back, if it may be, and the flags of its layout, of all `kinds` has."""
     flags: list[Value] = [] if degrees is None else [degrees]
-    for side, layout in zip(solve.sides(material), layouts):
+    for side, layout, kind in zip(solve.sides(material), layouts, kinds):
         transmission = solver.transmission(side, layout)
         flags += _flags(transmission) if transmission else []
         flags += _of_top(side, layout) if layout.apart else []
+        flags += [float(layout.alone)] if kind.alone else []
     return np.array(flags, np.float32)
 
 
@@ -235,7 +247,8 @@ def _any(transmission: Transmission, flags: Iterator[Value]) -> Transmission:
 
 def _of_kind(layout: Layout, kind: Layout) -> Layout:
     """The layout of a material with all that its kind draws, and nothing else."""
-    return replace(layout, lobes=kind.lobes, top=layout.top if kind.apart else None, apart=kind.apart, alone=kind.alone)
+    top = layout.top if kind.apart else None
+    return replace(layout, lobes=kind.lobes, top=top, apart=kind.apart, alone=layout.alone and kind.alone)
 
 
 def _colours_of(layout: Layout) -> int:

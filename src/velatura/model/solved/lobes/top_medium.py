@@ -143,10 +143,12 @@ class TopSamples(ops.NamedFields):
 
 @dataclass(frozen=True)
 class ScatteredThrough(ops.NamedFields):
-    """Light that a medium alone passes with events: a polynomial, and what is apart from it."""
+    """Light that a medium alone passes with events: a polynomial, and what is apart from it; where code is for others,
+    too, `is_alone` is 1 or 0."""
 
     polynomial: Remainder
     medium: PassedMedium
+    is_alone: Value = 1.0
 
 
 @dataclass(frozen=True)

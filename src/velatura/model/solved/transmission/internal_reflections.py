@@ -20,13 +20,14 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import reduce
 from math import pi
-from typing import Any
+from typing import Any, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
 
 from velatura import ops
 from velatura.model import fitted
+from velatura.model.directions import select_direction
 from velatura.model.solved.guards import COS_INSIDE_MIN, COS_OUTSIDE_MIN, G_MIN, INDEX_MAX, INTERNAL_ALPHA_MAX
 from velatura.model.solved.lobes import refracted_lobe, remainder
 from velatura.model.solved.lobes.refracted_lobe import RefractedLobe
@@ -95,11 +96,35 @@ def bound(transmission: Transmission) -> Value:
     )
 
 
-def rest(transmission: Transmission, wi: Direction, numbers: Sequence[Value] = EVEN) -> Rest | PassedSamples:
+@dataclass(frozen=True)
+class EitherRest:
+    """What a medium alone passes where a condition holds, else the light of other materials."""
+
+    where: Value
+    alone: PassedSamples
+    other: Rest
+
+    @property
+    def diffuse(self) -> Value:
+        return ops.select(self.where, self.alone.diffuse, self.other.diffuse)
+
+
+AnyRest: TypeAlias = Rest | PassedSamples | EitherRest
+
+
+def rest(transmission: Transmission, wi: Direction, numbers: Sequence[Value] = EVEN) -> AnyRest:
     """The light from wi, above, that is scattered by media, or often by facets; diffuse light has `numbers`, whose
     first is of a medium alone the share of samples by phase functions."""
-    if transmission.through:
-        return PassedSamples.of(transmission.through, numbers[0])
+    through = transmission.through
+    if through is None:
+        return _rest(transmission, wi, numbers)
+    alone = PassedSamples.of(through, numbers[0])
+    if isinstance(through.is_alone, float):
+        return alone
+    return EitherRest(through.is_alone > 0, alone, _rest(transmission, wi, numbers))
+
+
+def _rest(transmission: Transmission, wi: Direction, numbers: Sequence[Value]) -> Rest:
     reached = bound(transmission) / transmission.indices[-1]
     if not transmission.is_cloudy:
         return Rest(None, 1.0, reached, numbers)
@@ -185,10 +210,13 @@ def seen_below(transmission: Transmission, wi: Direction) -> Direction:
     return x, y, ops.maximum(ops.sqrt(1 - x * x - y * y), COS_INSIDE_MIN)
 
 
-def eval_pdf_rest(found: Rest | PassedSamples, i: Direction, o: Direction) -> tuple[Value, Value]:
+def eval_pdf_rest(found: AnyRest, i: Direction, o: Direction) -> tuple[Value, Value]:
     """f |cos theta_o|, a colour, and the density of `sample_rest`, in the frame of `seen_below`."""
     if isinstance(found, PassedSamples):
         return found.eval_pdf(i, o)
+    if isinstance(found, EitherRest):
+        (value, density), (other, of_other) = (eval_pdf_rest(each, i, o) for each in (found.alone, found.other))
+        return ops.select(found.where, value, other), ops.select(found.where, density, of_other)
     within = found.within(o)
     even = found.diffuse * ops.maximum(o[2], 0.0) / (found.bound * found.bound)
     value = ops.select(within[2] > 0, even * (1 / pi) * diffuse(found.numbers, i, within), 0.0)
@@ -199,10 +227,13 @@ def eval_pdf_rest(found: Rest | PassedSamples, i: Direction, o: Direction) -> tu
     return value, density
 
 
-def sample_rest(found: Rest | PassedSamples, i: Direction, u: Value, u1: Value, u2: Value) -> Direction:
+def sample_rest(found: AnyRest, i: Direction, u: Value, u1: Value, u2: Value) -> Direction:
     """A direction, in the frame of `seen_below`, from uniform numbers."""
     if isinstance(found, PassedSamples):
         return found.sample(i, u, u1, u2)
+    if isinstance(found, EitherRest):
+        w, other = (sample_rest(each, i, u, u1, u2) for each in (found.alone, found.other))
+        return select_direction(found.where, w, other)
     even = found.samples.sample(i, ops.clip(ops.divide(u, found.diffuse), 0.0, 1.0), u1, u2)
     x, y = found.bound * even[0], found.bound * even[1]
     even = x, y, ops.sqrt(1 - x * x - y * y)
@@ -222,7 +253,7 @@ def diffuse(numbers: Sequence[Value], i: Direction, o: Direction) -> Value:
     return ops.maximum(mean + once * s + twice * (2 * s * s - both), 0.0)  # model.md, Eq. 10
 
 
-def integral_rest(found: Rest | PassedSamples, i: tuple[Array, Array, Array]) -> Array:
+def integral_rest(found: AnyRest, i: tuple[Array, Array, Array]) -> Array:
     """Energy (3, N) of `eval_pdf_rest` from directions (N,) each."""
     assert isinstance(found, Rest)
     if not found.lobe:
