@@ -131,17 +131,17 @@ def test_one_channel_stands_for_an_image_of_colours(image: Callable[..., vt.Text
 
 
 def test_images_deeper_than_mixtures_go_are_replaced_by_their_means(image: Callable[..., vt.Texture]) -> None:
-    """Expected: with five shares, of the innermost two; the products that the means give."""
+    """Expected: with five shares, of the innermost two; the products that the means give, of what is left of the image between 0 and 1."""
     names = SHARES[from_openpbr]
     numbers = dict(zip(names, (0.3, 0.4, 0.2, 0.5, 0.9)))
-    masks = {**numbers, "base_metalness": image(0.1, 0.5), "transmission_weight": image(0.4, 0.6, name="clear")}
+    masks = {**numbers, "base_metalness": image(-0.5, 0.6), "transmission_weight": image(0.4, 0.6, name="clear")}
     found, expected = from_openpbr(**masks), from_openpbr(**numbers)
     assert {each.parameter for each in found.left} == {"weight mask.exr", "weight clear.exr"}
     assert layers(found.stack) == layers(expected.stack)
     np.testing.assert_allclose(
         [share for share, _ in found.stack.weighted("")],
         [share for share, _ in expected.stack.weighted("")],
-        rtol=1e-4,  # of images in half precision
+        rtol=1e-3,  # of images in half precision
     )
 
 

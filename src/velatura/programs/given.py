@@ -13,7 +13,7 @@ from velatura.errors import InvalidInput
 from velatura.programs.imported import Notes, shown
 from velatura.programs.parameters import Input
 from velatura.programs.surface import INDICES
-from velatura.programs.values import Array, Value, changed, colour, mean, rounded, texels
+from velatura.programs.values import Array, Value, changed, colour, rounded, texels
 from velatura.stack import RGB, Texture
 from velatura.stack.schema import show, unknown
 
@@ -122,7 +122,8 @@ class Given:
         if not isinstance(value, Texture):
             return value
         self.notes.add(name, value, "the mean of the image stands for it")
-        return mean(value, self._declared[name].is_colour)
+        found = np.mean(texels(value, self._declared[name].is_colour), axis=(0, 1))
+        return colour(found) if len(found) == 3 else float(found[0])
 
     def _read(self, declared: Input, value: Any) -> Value:
         if isinstance(value, Mapping):

@@ -5,8 +5,10 @@ from __future__ import annotations
 from collections.abc import Collection, Sequence
 from typing import TypeAlias
 
+import numpy as np
+
 from velatura.programs.imported import Notes
-from velatura.programs.values import mean
+from velatura.programs.values import texels
 from velatura.stack import Described, Mix, Stack, Texture
 from velatura.stack.mix import DEEPEST, MOST, WEIGHT
 
@@ -54,7 +56,8 @@ def _shares(material: Described) -> list[tuple[Place, float]]:
 
 
 def _number(share: Share) -> float:
-    return min(max(float(mean(share)), 0.0), 1.0) if isinstance(share, Texture) else share  # type: ignore[arg-type]
+    """A share in the mean over the surface."""
+    return float(np.mean(np.clip(texels(share), 0, 1))) if isinstance(share, Texture) else share
 
 
 def _called(material: Described, place: Place) -> str:

@@ -7,22 +7,21 @@ from typing import TypeAlias
 
 import numpy as np
 
-from velatura import kernel
-from velatura.binding.textures import texels as texels_of_file
 from velatura.programs.parameters import RGB, Values
 from velatura.programs.program import Carried, Program
-from velatura.stack import Address, Brushing, Stack, Texture, Varying
+from velatura.programs.values import texels
+from velatura.stack import Address, Brushing, Described, Stack, Texture, Varying
 
 Means: TypeAlias = dict[str, "float | RGB"]
 
 
-def means(stack: Stack) -> Means:
+def means(material: Described) -> Means:
     """Means of all textures by flat name, and the offset of fields of directions; none of a material without.
 
     Raises:
         InvalidInput: an image that cannot be read. MissingTool: LLVM is missing or too old.
     """
-    varying = [(address, value) for address, value in stack.values() if isinstance(value, Varying)]
+    varying = [(address, value) for address, value in material.values() if isinstance(value, Varying)]
     return {address.name: _mean(address, value) for address, value in varying}
 
 
@@ -31,8 +30,7 @@ def _mean(address: Address, value: Varying) -> float | RGB:
         return value.offset
     assert isinstance(value, Texture)
     colour = address.colour and value.channel in (None, "rgb")
-    texels = texels_of_file(kernel.mitsuba(), address.name, value, colour)
-    mean = np.clip(value.scale * texels + value.offset, *address.declared.within).mean(axis=(0, 1))
+    mean = np.clip(texels(value, colour, address.name), *address.declared.within).mean(axis=(0, 1))
     if len(mean) == 1:
         return float(mean[0])
     r, g, b = (float(x) for x in mean)

@@ -61,8 +61,8 @@ def middle(value: Value) -> float:
     return float(np.mean(value))
 
 
-def texels(texture: Texture, is_colour: bool = False) -> Array:
-    """The values (height, width, channels) of an image, of three channels or one.
+def texels(texture: Texture, is_colour: bool = False, name: str = "") -> Array:
+    """The values (height, width, channels) of an image, of three channels or one; `name` is that of the value.
 
     Raises:
         InvalidInput: it cannot be read. MissingTool: LLVM is missing or too old.
@@ -70,14 +70,8 @@ def texels(texture: Texture, is_colour: bool = False) -> Array:
     from velatura import kernel
     from velatura.binding.textures import texels as texels_of_file
 
-    found = texels_of_file(kernel.mitsuba(), texture.texture.name, texture, is_colour)
+    found = texels_of_file(kernel.mitsuba(), name or texture.texture.name, texture, is_colour)
     return np.asarray(texture.scale * found.astype(float) + texture.offset)
-
-
-def mean(texture: Texture, is_colour: bool = False) -> float | RGB:
-    """The mean of an image, as `texels` reads it."""
-    found = np.mean(texels(texture, is_colour), axis=(0, 1))
-    return colour(found if found.size == 3 else float(found[0])) if is_colour else float(found[0])
 
 
 def _at_nodes(texture: Texture) -> Array:
