@@ -108,7 +108,7 @@ def round_trips(count: int) -> None:
 def main() -> None:
     args = parsed(
         __doc__,
-        presets=list(vt.presets()),
+        presets=list(vt.presets(mixtures=False)),
         targets=(list(TARGETS), "", list(TARGETS)),
         round_trips=(int, "N materials, in place of presets"),
     )

@@ -37,7 +37,7 @@ Job = tuple[str, str, str]  # model, form, material: the name of a preset, or se
 Row = dict[str, Any]
 
 
-def material(name: str) -> vt.Stack:
+def material(name: str) -> vt.Stack | vt.Mix:
     """A preset, or a random stack of the name "random SEED NUMBER"."""
     if name in vt.presets():
         return vt.load(name)
@@ -74,7 +74,7 @@ def main() -> None:
         __doc__,
         models=[model.name for model in vt.MODELS],
         forms=["forward", "symmetric"],
-        presets=vt.presets(),
+        presets=list(vt.presets()),
         random=(int, "random stacks instead of presets"),
         seed=(0, "of random stacks"),
         results=Path,

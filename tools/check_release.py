@@ -33,6 +33,7 @@ PACKAGE = (
     "velatura/tables/tables.npz",
     "velatura/editor/static/editor.js",
     "velatura/stack/presets/coated-gold.yaml",
+    "velatura/stack/presets/wear.png",
 )
 LICENCES = ("LICENSE", "THIRD-PARTY-LICENSES.txt")
 SOURCES = ("tests/conftest.py", "docs/index.md", "benchmarks/rows.py", "CHANGELOG.md", "pyproject.toml", *LICENCES)

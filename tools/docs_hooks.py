@@ -177,17 +177,17 @@ def _substances() -> str:
     return "\n".join(rows)
 
 
-def _card(name: str, stack: Any, distance: dict[str, float]) -> str:
+def _card(name: str, material: Any, distance: dict[str, float]) -> str:
     import velatura as vt
+    from velatura.programs.textures import means
 
-    found = vt.lobes(stack, 1.0)
-    kinds = [kind for kind in stack.kinds if kind not in ("medium", "diffuse")]
-    lobes = [f"{kind}: {_energy(e)}, α {_alphas(a)}" for kind, e, a in zip(kinds, found.energy, found.alpha)]
-    if found.transmitted is not None:
-        lobes.append(f"passed: {_energy(found.transmitted.energy)}, α {_alphas(found.transmitted.alpha)}")
-    lobes.append(f"in no lobe: {_energy(found.remainder)}")
+    whole = material.replace(**means(material)) if isinstance(material, vt.Mix) else material
+    lobes: list[str] = []
+    for share, stack in whole.weighted("a card has no textures"):
+        where = f"{stack.name}, on {100 * share:.0f} %: " if isinstance(material, vt.Mix) else ""
+        lobes += [where + each for each in _lobes(stack)]
     return f"""\
-:::{{grid-item-card}} {stack.name}
+:::{{grid-item-card}} {material.name}
 :img-top: ../../src/velatura/editor/page/thumbnails/{name}.jpg
 :img-alt: The preset {name} on the material ball
 
@@ -198,6 +198,18 @@ def _card(name: str, stack: Any, distance: dict[str, float]) -> str:
 Total variation {_written(distance["total_variation"], 3)} (noise {_written(distance["noise"], 3)}), albedo within
 {_written(distance["albedo"], 3)}
 :::"""
+
+
+def _lobes(stack: Any) -> list[str]:
+    """Each lobe of a stack, and what is in none, for light along the normal."""
+    import velatura as vt
+
+    found = vt.lobes(stack, 1.0)
+    kinds = [kind for kind in stack.kinds if kind not in ("medium", "diffuse")]
+    lobes = [f"{kind}: {_energy(e)}, α {_alphas(a)}" for kind, e, a in zip(kinds, found.energy, found.alpha)]
+    if found.transmitted is not None:
+        lobes.append(f"passed: {_energy(found.transmitted.energy)}, α {_alphas(found.transmitted.alpha)}")
+    return [*lobes, f"in no lobe: {_energy(found.remainder)}"]
 
 
 def _energy(energy: Any) -> str:

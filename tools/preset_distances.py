@@ -10,13 +10,15 @@ import numpy as np
 
 import velatura as vt
 from velatura.model import DEFAULT
+from velatura.programs.textures import means
 
 PLACES = 4
 
 
 def distances(preset: str, paths: int = 1_000_000) -> dict[str, float]:
-    """How far the default model is from `paths` walks for each direction of incidence."""
-    found = vt.compare(preset, [DEFAULT], paths=paths)
+    """How far the default model is from `paths` walks for each direction of incidence; of textures, for the mean."""
+    material = vt.preset(preset)
+    found = vt.compare(material.replace(**means(material)), [DEFAULT], paths=paths)
     model = found.models[DEFAULT]
     numbers = {
         "total_variation": np.mean(found.total_variation[DEFAULT]),

@@ -312,7 +312,7 @@ def test_a_material_is_found_by_its_picture_or_its_name(visit: Open) -> None:
     page = visit()
     page.page.get_by_role("button", name="Open", exact=True).click()
     pictures = page.page.locator("dialog.open img")
-    assert pictures.count() == len(vt.presets())
+    assert pictures.count() == len(vt.presets(mixtures=False))
     page.page.wait_for_function("() => document.querySelector('dialog.open img').naturalWidth === 160")
     page.page.get_by_label("Search").fill("enamel")
     assert pictures.count() == 1

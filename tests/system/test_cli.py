@@ -117,7 +117,7 @@ def test_presets_and_schema(run: Run) -> None:
     lines = run("presets")[1].splitlines()
     assert [line.split()[0] for line in lines] == list(listed)
     assert max(map(len, lines)) < 80
-    assert json.loads(run("schema")[1])["required"] == ["layers"]
+    assert json.loads(run("schema")[1])["$defs"]["stack"]["required"] == ["layers"]
 
 
 # Bad input

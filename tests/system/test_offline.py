@@ -40,7 +40,7 @@ def test_orders_are_those_that_the_page_can_make() -> None:
     assert [sum(order.thin == thin for order in made) for thin in (False, True)] == [60, 15]
     below = offline.Order(("dielectric", "medium"))
     assert refusals[below] == "layer 1 (medium): an interface or a diffuse base must lie below a medium"
-    for name in presets():
+    for name in presets(mixtures=False):
         assert refusals[offline.Order.of(preset(name))._replace(brushed=False)] == ""
 
 

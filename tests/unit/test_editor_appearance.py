@@ -106,7 +106,7 @@ def test_a_material_is_read_and_found_again(model: str) -> None:
     assert found["layer2_eta"] == pytest.approx(vt.stack.rgb(given["layer2_eta"]), abs=error)
 
 
-@pytest.mark.parametrize("name", presets())
+@pytest.mark.parametrize("name", presets(mixtures=False))
 def test_every_preset_is_read_or_says_why_not(name: str) -> None:
     material = appearance.document(vt.preset(name))
     answer = appearance.appearance({"material": material, "model": "bati2021"})

@@ -329,7 +329,7 @@ def test_a_fixed_quadrature_has_the_colours_of_a_fine_one(thickest_nm: float) ->
     assert max(off) < 4e-3 and np.mean(off) < 4e-4
 
 
-@pytest.mark.parametrize("preset", [name for name in vt.presets() if not any(vt.preset(name).films)])
+@pytest.mark.parametrize("preset", [name for name in vt.presets(mixtures=False) if not any(vt.preset(name).films)])
 def test_interfaces_without_films_have_no_tables(preset: str) -> None:
     """Neither rows of reflectances, nor a texture beside a shader."""
     assert not any(films_of(Material.of(vt.preset(preset))))

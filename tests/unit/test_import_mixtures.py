@@ -131,7 +131,8 @@ def test_one_channel_stands_for_an_image_of_colours(image: Callable[..., vt.Text
 
 
 def test_images_deeper_than_mixtures_go_are_replaced_by_their_means(image: Callable[..., vt.Texture]) -> None:
-    """Expected: with five shares, of the innermost two; the products that the means give, of what is left of the image between 0 and 1."""
+    """Expected: with five shares, of the innermost two; the products that the means give, of values that are kept
+    between 0 and 1."""
     names = SHARES[from_openpbr]
     numbers = dict(zip(names, (0.3, 0.4, 0.2, 0.5, 0.9)))
     masks = {**numbers, "base_metalness": image(-0.5, 0.6), "transmission_weight": image(0.4, 0.6, name="clear")}

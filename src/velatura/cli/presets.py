@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 def presets(as_json: options.Json = False) -> None:
     """List the materials that come with the package.
 
-    Each with its layers from the top; the JSON also has the source of its numbers.
+    Each with its layers from the top, mixtures with the names of their parts; the JSON also has the source of numbers.
     """
     from velatura import stack
 
@@ -32,7 +32,9 @@ def presets(as_json: options.Json = False) -> None:
 
     width = max(map(len, materials))
     for name, material in materials.items():
-        print(f"{name:{width}}  {' + '.join(map(_layers, _kinds(material)))}")
+        stacks = [stack for _, stack in material.leaves()]
+        shown = _layers(stacks[0].kinds) if len(stacks) == 1 else " + ".join(stack.name for stack in stacks)
+        print(f"{name:{width}}  {shown}")
 
 
 def _kinds(material: Described) -> list[tuple[Kind, ...]]:

@@ -170,11 +170,11 @@ def _write(
 def _tasks(plain: Sequence[Order], models: Sequence[Model]) -> list[Callable[[], Made]]:
     brushed = [order._replace(brushed=True) for order in plain if order.stack.interfaces]
     solved = [model.name for model in models if model.surrogate is not model]
-    coated = [name for name in presets() if any(layer.films for layer in preset(name).interfaces)]
+    coated = [name for name in presets(mixtures=False) if any(layer.films for layer in preset(name).interfaces)]
     return [
         *(functools.partial(_coated, model, name) for model in models for name in coated),
         *(functools.partial(_shader, model.name, order) for model in models for order in [*plain, *brushed]),
-        *(functools.partial(_solved, model, name) for model in solved for name in presets()),
+        *(functools.partial(_solved, model, name) for model in solved for name in presets(mixtures=False)),
     ]
 
 
@@ -219,7 +219,7 @@ def _refusals(layers: int) -> dict[Order, str]:
     """Every order of so many layers, or of a preset, and why they cannot lie in it; empty where they can."""
     words = [word for count in range(1, layers + 1) for word in itertools.product(KINDS, repeat=count)]
     every = [order for word in words for order in (Order(word), Order(word, thin=True))]
-    own = (Order.of(preset(name))._replace(brushed=False) for name in presets())
+    own = (Order.of(preset(name))._replace(brushed=False) for name in presets(mixtures=False))
     return {order: _refusal(order) for order in dict.fromkeys([*every, *own])}
 
 

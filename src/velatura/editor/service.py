@@ -115,7 +115,7 @@ def _constants() -> Answer:
         "version": __version__,
         "schema": {where: _keys(model) for where, model in _RECORDS.items()},
         "layers": {name: _layer(layer) for name, layer in LAYERS.items()},
-        "presets": [_preset(name) for name in presets()],
+        "presets": [_preset(name) for name in presets(mixtures=False)],
         "models": [_model(model) for model in MODELS],
         "default_model": DEFAULT,
         "formats": [{"name": name, "fixed": "constant" in format.options} for name, format in exports.FORMATS.items()],

@@ -137,12 +137,14 @@ def preset(name: str) -> Loaded:
     if name not in presets():
         unknown_name = unknown("preset", name, presets(), "`velatura presets` lists all")
         raise InvalidInput(f"{unknown_name}; a material file ends in {', '.join(ENDINGS)}")
-    return loads((_PRESETS / f"{name}.yaml").read_text(encoding="utf-8"), name=f"{name}.yaml")
+    text = (_PRESETS / f"{name}.yaml").read_text(encoding="utf-8")
+    return loads(text, name=f"{name}.yaml", folder=str(_PRESETS))
 
 
-def presets() -> tuple[str, ...]:
-    """The names of all presets, sorted."""
-    return tuple(sorted(file.name.removesuffix(".yaml") for file in _PRESETS.iterdir()))
+def presets(mixtures: bool = True) -> tuple[str, ...]:
+    """The names of all presets, sorted; of those that are no mixtures, where these are not wanted."""
+    names = sorted(file.name.removesuffix(".yaml") for file in _PRESETS.iterdir() if file.name.endswith(".yaml"))
+    return tuple(name for name in names if mixtures or isinstance(preset(name), Stack))
 
 
 # Out -----------------------------------------------------------------------------------------------------------------

@@ -57,7 +57,7 @@ def random_target(rng: np.random.Generator) -> dict[str, Any]:
     if rng.random() < 0.2:
         target["channels"] = str(rng.choice(["mean", "separate"]))
     if rng.random() < 0.2:
-        target["start"] = vt.preset(str(rng.choice(vt.presets()))).to_dict()
+        target["start"] = vt.preset(str(rng.choice(vt.presets(mixtures=False)))).to_dict()
     return target
 
 
