@@ -65,6 +65,39 @@ def test_a_file_is_taken_wherever_a_material_is(document: Path) -> None:
     assert str(bsdf) == str(vt.bsdf(expected))
 
 
+def test_shares_are_rendered_as_mixtures(run: Run, document: Path, tmp_path: Path) -> None:
+    """Expected: from the file and from what `import` writes the same picture, between those of the whole shares."""
+    document.write_text(
+        DOCUMENT.replace('"coat_weight" type="float" value="1"', '"base_metalness" type="float" value="0.3"')
+    )
+    assert run("import", str(document), "-o", str(tmp_path / "half.yaml"))[0] == 0
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", Incomplete)
+        found: Any = vt.load(document)
+    assert vt.load(tmp_path / "half.yaml") == found and found.mix[0].weight == 0.3
+    for name, file in (("a", document), ("b", tmp_path / "half.yaml")):
+        command = (
+            "render",
+            str(file),
+            "--scene",
+            "sphere",
+            "--size",
+            "16",
+            "--spp",
+            "4",
+            "-o",
+            f"{tmp_path / name}.exr",
+        )
+        assert run(*command)[0] == 0
+    images = [np.array(kernel.bitmap(tmp_path / f"{name}.exr")) for name in "ab"]
+    np.testing.assert_array_equal(*images)
+    si: Any = kernel.mitsuba().SurfaceInteraction3f()
+    si.wi = wo = kernel.mitsuba().Vector3f(0.0, 0.0, 1.0)
+    parts = [vt.bsdf(material) for material in (found, *(part.material for part in found.mix))]
+    whole, metal, paint = (np.ravel(each.eval(kernel.mitsuba().BSDFContext(), si, wo)) for each in parts)
+    np.testing.assert_allclose(whole, 0.3 * metal + 0.7 * paint, rtol=1e-5)
+
+
 def test_a_scene_names_it(document: Path, tmp_path: Path) -> None:
     """Expected: the BSDF of its stack, from a dictionary, and from a scene beside it that names the material."""
     mi: Any = kernel.mitsuba()

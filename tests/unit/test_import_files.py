@@ -390,6 +390,10 @@ def test_mixes_of_mixes_are_read_once(write: Write) -> None:
     ("nodes", "message"),
     [
         (mixed("", bg="S"), "material M: a cycle of nodes"),
+        (
+            mixed("", bg="m0") + "".join(mixed("", bg=f"m{n + 1}", name=f"m{n}") for n in range(2000)),
+            "material M: mixes more than 64 nodes",
+        ),
         (mixed("", bg="other"), "material M: there is no node other"),
         ('<mix name="S" type="surfaceshader"/>', "material M: the node S lacks fg"),
         (

@@ -67,7 +67,7 @@ DEFAULTS: Mapping[str, Mapping[str, Any]] = {
 }
 _COVER, _MODES = {"alpha_mode": 0.0, "alpha_cutoff": 0.5}, {1.0: "MASK", 2.0: "BLEND"}  # inputs of gltf_pbr
 IMAGES = ("image", "tiledimage", "gltf_image", "gltf_colorimage")
-DEEPEST = 64  # nodes in a row
+DEEPEST = 64  # nodes in a row, and of a mix of surfaces
 LINEAR_FROM_ACESCG = np.array(  # primaries AP1 and white of ACES to those of sRGB, adapted by Bradford's matrix
     [[1.70505, -0.62179, -0.08326], [-0.13026, 1.14080, -0.01055], [-0.02400, -0.12897, 1.15297]]
 )
@@ -158,6 +158,8 @@ class _Mixed:
 
     def __call__(self, node: Element) -> Described:
         if id(node) not in self._found:
+            if len(self._found) >= DEEPEST:
+                raise InvalidInput(f"{self._path}: material {self._name}: mixes more than {DEEPEST} nodes")
             self._found[id(node)] = None
             self._found[id(node)] = self._mix(node) if node.tag == "mix" else self._surface(node)
         found = self._found[id(node)]
