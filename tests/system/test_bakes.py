@@ -121,6 +121,62 @@ def test_what_is_not_held_is_said() -> None:
     ]
 
 
+# Mixtures -------------------------------------------------------------------------------------------------------------
+
+TAN = (0.9, 0.6, 0.3)
+COPPER = vt.Stack([vt.Interface(eta=(0.28, 0.48, 1.08), k=(3.6, 2.6, 2.4), alpha=0.2)])
+PAINT = vt.Stack([vt.Interface(eta=1.5, alpha=0.2), vt.Diffuse(albedo=TAN)])
+LACQUER = vt.Interface(eta=1.5, alpha=0.05)
+
+
+@pytest.mark.parametrize(
+    ("target", "metal", "coat"),
+    [
+        ("openpbr", "base_metalness", "coat_weight"),
+        ("gltf", "metallicFactor", "clearcoatFactor"),
+        ("blender-principled", "Metallic", "Coat Weight"),
+    ],
+)
+def test_metalness_and_coverage_are_shares_of_a_mixture(target: str, metal: str, coat: str) -> None:
+    """Expected: the shares that are metal and that have a coat of index 1.5, as a program has them itself; of a metal
+    beside a dielectric of the same roughness 97 % of the light is in its place."""
+    made = bake(vt.Mix([(0.4, COPPER), (None, PAINT)]), target)
+    assert made.values[metal] == pytest.approx(0.4, abs=1e-6)
+    assert made.values[coat] == 0
+    assert made.total_variation.max() < 0.03 and np.abs(made.baked_albedo - made.albedo).max() < 0.02
+    coated = vt.Mix([(0.4, vt.Stack([LACQUER, *COPPER.layers])), (None, COPPER)])
+    assert bake(coated, target).values[coat] == pytest.approx(0.4, abs=1e-6)
+
+
+@pytest.mark.parametrize("target", TARGETS)
+def test_the_light_of_a_mixture_is_the_weighted_sum(target: str) -> None:
+    """Expected: the albedo that is compared, to the errors of quadrature; of two equal parts the parameters of one."""
+    made, *each = (bake(m, target) for m in (vt.Mix([(0.3, COPPER), (None, PAINT)]), COPPER, PAINT))
+    np.testing.assert_allclose(made.albedo, 0.3 * each[0].albedo + 0.7 * each[1].albedo, atol=2e-3)
+    alike = bake(vt.Mix([(0.3, PAINT), (None, PAINT)]), target)
+    assert np.abs(alike.baked_albedo - each[1].baked_albedo).max() < 0.01
+
+
+def test_a_mixture_stays_in_its_file_and_its_losses_name_parts(tmp_path: Path) -> None:
+    """Expected: the file holds the mixture, which is read again; a mask is replaced by its mean."""
+    vt.scenes.write_image(np.linspace(0, 1, 16, dtype=np.float32).reshape(4, 4, 1), tmp_path / "mask.exr")
+    thick = vt.Stack([LACQUER, vt.Medium(sigma_a=0.1, sigma_s=0.3), vt.Diffuse(albedo=TAN)], name="thick")
+    mask = {"texture": str(tmp_path / "mask.exr"), "scale": 0.8}
+    mix = vt.Mix([(mask, "bare-gold"), (None, vt.Mix([(0.5, thick), (None, PAINT)]))], name="Worn")
+    for target, ending in (("openpbr", ".mtlx"), ("gltf", ".gltf"), ("mitsuba-principled", ".xml")):
+        made = vt.export(mix, target, folder=tmp_path)
+        made.save(tmp_path / f"worn{ending}")
+        lost = [note for note in made.notes if note.startswith("not held: ")]
+        assert (
+            "not held: the parts become one surface, which has their shares of metal, coat and light that passes"
+            in lost
+        )
+        assert "not held: part 1.0: layer 1: scattering is part of the base's colour" in lost
+        assert "not held: part0_weight: the image is replaced by its mean" in lost
+        with pytest.warns(UserWarning, match="holds the stack that the parameters were fitted to"):
+            assert vt.load(tmp_path / f"worn{ending}") == mix
+
+
 @pytest.mark.parametrize("target", TARGETS)
 def test_a_pane_that_becomes_a_solid_is_said(target: str) -> None:
     pane = Described.of(Material.of(vt.preset("frosted-glass")), named("belcour2018"))

@@ -22,8 +22,8 @@ import pytest
 from machines import MACHINES
 
 import velatura as vt
-from velatura.bakes import TARGETS
 from velatura.exports import FORMATS, baked
+from velatura.stack import Texture
 
 HARMLESS = "Plain paint"
 HOSTILE = [
@@ -98,9 +98,9 @@ def fitted_once(monkeypatch: pytest.MonkeyPatch) -> None:
     """Parameters do not depend on names; they are fitted once for a target."""
     fit, found = baked.bake, dict[str, Any]()
 
-    def of_any_name(stack: vt.Stack, target: str, *rest: Any) -> Any:
+    def of_any_name(stack: vt.Stack | vt.Mix, target: str, *rest: Any) -> Any:
         made = found[target] = found.get(target) or fit(stack, target, *rest)
-        texture = stack.flat()["layer0_albedo"]
+        texture: Any = next((x for x in stack.flat().values() if isinstance(x, Texture)), None)
         images = {name: replace(image, texture=texture) for name, image in made.images.items()}
         return replace(made, name=stack.name, images=images)
 
@@ -166,7 +166,7 @@ def test_paths_of_textures_do_not_change_the_structure_of_files(to: str, maps: l
             assert to != "gltf" or unquote(found["images"][0]["uri"]).endswith(end)
 
 
-@pytest.mark.parametrize("to", [to for to in FORMATS if to not in TARGETS])
+@pytest.mark.parametrize("to", FORMATS)
 def test_mixtures_keep_their_structure(to: str, maps: list[Path]) -> None:
     """Expected: the same of the names of a mixture and of a part, and of the path of a mask."""
 

@@ -1,8 +1,8 @@
-"""Fit of a program's parameters to a stack, and the loss that remains."""
+"""Fit of a program's parameters to a material, and the loss that remains."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -17,7 +17,7 @@ from velatura.programs.parameters import UNIT, Values, complete
 from velatura.programs.program import Bake, Carried, Fitted, Program, Range
 from velatura.programs.sampled import Sampled
 from velatura.programs.textures import carried, means
-from velatura.stack import Material, MaterialLike, single
+from velatura.stack import Material, MaterialLike, Mix, Stack, load
 from velatura.stack.schema import unknown
 
 FITTED, AZIMUTHS = (1.0, 0.85, 0.6, 0.35), (0.0, 60.0, 120.0)  # cosines of incidence, and degrees where brushed
@@ -36,7 +36,7 @@ TARGETS: dict[str, Program] = {name: baked.program() for name, baked in BAKED.it
 
 
 def bake(material: MaterialLike, target: str, model: str | Model = DEFAULT, **switches: str) -> Bake:
-    """Fit a target's parameters to the light of a stack; to that of its mean where it has textures.
+    """Fit a target's parameters to the light of a stack or a mixture; to that of its mean where it has textures.
 
     Raises:
         InvalidInput: not a valid material, an unknown target, model or switch, an image that cannot be read.
@@ -46,16 +46,17 @@ def bake(material: MaterialLike, target: str, model: str | Model = DEFAULT, **sw
 
     if target not in TARGETS:
         raise InvalidInput(unknown("target", target, TARGETS))
-    chosen, stack, program = named(model, **switches), single(material, "a bake"), TARGETS[target]
-    found = means(stack)
-    described = Described.of(Material.of(stack.replace(**found)), chosen)
+    chosen, material, program = named(model, **switches), load(material), TARGETS[target]
+    found = means(material)
+    stacks = _stacks(material.replace(**found), chosen)
+    described = Described.beside([(share, stack) for _, share, stack in stacks])
     azimuths = np.radians(AZIMUTHS if described.brushed else AZIMUTHS[:1])
     cosines, turns = (x.ravel() for x in np.meshgrid(FITTED, azimuths))
     sampled = Sampled.of(described, chosen, directions(cosines, turns), NODES)
     with threadpool_limits(1, "blas"):  # matrices are so small that threads wait for each other
         values = _fitted(program, described, sampled)
 
-    varying = dict(carried(stack, found, program, values))
+    varying = dict(carried(material, found, program, values))
     left = [f"{name}: {what}" for name, what in varying.items() if isinstance(what, str)]
     images = {name: image for name, image in varying.items() if isinstance(image, Carried)}
 
@@ -66,7 +67,7 @@ def bake(material: MaterialLike, target: str, model: str | Model = DEFAULT, **sw
     return Bake(
         target=target,
         title=program.title,
-        name=stack.name,
+        name=material.name,
         model=chosen.name,
         values=values,
         cos_theta=COSINES,
@@ -75,7 +76,7 @@ def bake(material: MaterialLike, target: str, model: str | Model = DEFAULT, **sw
         baked_albedo=shown.energy(light),
         passed=shown.energy(shown.value, up=False),
         baked_passed=shown.energy(light, up=False),
-        lost=(*lost(described, program), *left),
+        lost=(*_lost(stacks, program), *left),
         images=images,
         thin=described.thin,
     )
@@ -83,10 +84,29 @@ def bake(material: MaterialLike, target: str, model: str | Model = DEFAULT, **sw
 
 def distribution(made: Bake, material: MaterialLike, cos_theta: Sequence[float]) -> Array:
     """Energies (3, N, bins, bins) of light that a bake of a material reflects, over the projected disc."""
-    stack, chosen = single(material, "a bake"), named(made.model)
-    stack = stack.replace(**means(stack))
-    shown = Sampled.of(Described.of(Material.of(stack), chosen), chosen, directions(cos_theta), COMPARED)
+    material, chosen = load(material), named(made.model)
+    stacks = _stacks(material.replace(**means(material)), chosen)
+    described = Described.beside([(share, stack) for _, share, stack in stacks])
+    shown = Sampled.of(described, chosen, directions(cos_theta), COMPARED)
     return shown.distribution(TARGETS[made.target].value(made.values, shown.pair, made.thin))
+
+
+def _stacks(material: Stack | Mix, model: Model) -> list[tuple[str, float, Described]]:
+    """The stacks of a material that have a share of the surface, with that share, and the name of their part."""
+    each = zip(material.leaves(), material.weighted("is replaced by its mean"))
+    return [
+        (f"part {'.'.join(map(str, path))}: " if path else "", share, Described.of(Material.of(stack), model))
+        for (path, _), (share, stack) in each
+        if share > 0
+    ]
+
+
+def _lost(stacks: Sequence[tuple[str, float, Described]], program: Program) -> Iterator[str]:
+    """A line for each property that is left out or replaced."""
+    if len(stacks) > 1:
+        yield "the parts become one surface, which has their shares of metal, coat and light that passes"
+    for part, _, stack in stacks:
+        yield from (part + line for line in lost(stack, program))
 
 
 @dataclass(frozen=True)

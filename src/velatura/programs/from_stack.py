@@ -1,53 +1,82 @@
-"""The surfaces that a stack may be seen as."""
+"""The surfaces that a material may be seen as."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
-from typing import TypeAlias
+from itertools import islice
+from typing import Any, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
 
 from velatura.model import Model, variance_kind
 from velatura.model.lobe_statistics import StackLobes
+from velatura.model.side_by_side import SideBySide
 from velatura.model.variance import Isotropic
 from velatura.optics import fresnel
-from velatura.programs.surface import Coat, Surface
+from velatura.programs.surface import NO_COAT, Coat, Surface
 from velatura.stack import RGB, InterfaceValues, Material, SlabValues
 
 Array: TypeAlias = NDArray[np.floating]
 Facets: TypeAlias = tuple[float, float, float]  # alpha along two axes, and the radians from the tangent to the first
 
 SAME = 1e-6  # of roughnesses
+ALTERNATIVES = 3  # surfaces that a mixture may be seen as, beside the likeliest
 NO_FACETS = (0.25, 0.25)  # alpha where nothing reflects by it
 
 
 @dataclass(frozen=True)
 class Described:
-    """A stack for bakes: its values, the brushed lobes at normal incidence, the index that it transmits into (None if
-    none), and the surfaces that it may be seen as, the likeliest first.
+    """A material for bakes: the values of its stacks, with the shares of these; the brushed lobes at normal incidence,
+    the index that it transmits into (None if none), and the surfaces that it may be seen as, the likeliest first.
     """
 
-    material: Material
+    parts: tuple[tuple[float, Material], ...]
     brushed: tuple[Facets, ...]
     below: float | None
     surfaces: tuple[Surface, ...]
 
     @classmethod
     def of(cls, material: Material, model: Model) -> Described:
+        """A single stack."""
         solid = material.solid()
         below = float(np.mean(solid.interfaces[-1].eta / solid.exterior)) if solid.transmits else None
         x, y, z = (np.array([w]) for w in (0.0, 0.0, 1.0))
         seen = model.statistics(solid, (x, y, z))
         brushed = variance_kind(solid) is not Isotropic
         lobes = tuple(_facets(seen, k) for k in range(len(seen.alpha) * brushed))
-        return cls(solid, lobes, below, tuple(_surfaces(solid, seen)))
+        return cls(((1.0, solid),), lobes, below, tuple(_surfaces(solid, seen)))
+
+    @classmethod
+    def beside(cls, each: Sequence[tuple[float, Described]]) -> Described:
+        """Stacks side by side, each with its share: surfaces that have the means of theirs."""
+        if len(each) == 1:
+            return each[0][1]
+        below = next((stack.below for _, stack in each if stack.below is not None), None)
+        likeliest = [(share, stack.surfaces[0]) for share, stack in each]
+        surfaces = [blended(likeliest)]
+        for n, (share, stack) in enumerate(each):
+            others = (blended([*likeliest[:n], (share, other), *likeliest[n + 1 :]]) for other in stack.surfaces[1:])
+            surfaces += islice(others, ALTERNATIVES + 1 - len(surfaces))
+        lobes = tuple(dict.fromkeys(lobe for _, stack in each for lobe in stack.brushed))
+        parts = tuple((share, material) for share, stack in each for _, material in stack.parts)
+        return cls(parts, lobes, below, tuple(surfaces))
+
+    def body(self, model: Model) -> SideBySide:
+        """The material as light meets it."""
+        return SideBySide.of(self.parts, model)
+
+    @property
+    def material(self) -> Material:
+        """A single stack's values."""
+        ((_, material),) = self.parts
+        return material
 
     @property
     def mixed(self) -> bool:
         """Whether media scatter light, above a base or a clear one."""
-        return _scatters(self.material)
+        return any(_scatters(material) for _, material in self.parts)
 
     @property
     def coated(self) -> bool:
@@ -64,18 +93,46 @@ class Described:
         """Whether reflectances at the normal are not those of one index for all colours."""
         return any(
             each.kind != "dielectric" or bool(each.films) or np.ptp(np.broadcast_to(each.eta, (3, 1))) > 1e-6
-            for each in self.material.interfaces
+            for _, material in self.parts
+            for each in material.interfaces
         )
 
     @property
     def blurred(self) -> bool:
         """Whether anything but facets of one interface spreads what is reflected, or light passes."""
-        return self.below is not None or len(self.material.interfaces) > 1 or self.mixed
+        several = len(self.parts) > 1 or any(len(material.interfaces) > 1 for _, material in self.parts)
+        return self.below is not None or several or self.mixed
 
     @property
     def thin(self) -> bool:
         """Whether what light passes into has the index that it came from."""
         return self.below is not None and abs(self.below - 1) < 1e-3
+
+
+def blended(parts: Sequence[tuple[float, Surface]]) -> Surface:
+    """The surface that has the means of those of parts, by their shares: of colours, roughnesses and indices; and the
+    shares that are metal and coated, and those of the rest of the base that are clear. Brushing, film and coat are those of the greatest share."""
+
+    def mean(value: Callable[[Surface], Any], weight: Callable[[Surface], float] = lambda _: 1.0) -> Any:
+        weights = [share * weight(each) for share, each in parts]
+        values = [np.asarray(value(each), float) for _, each in parts]
+        return np.average(values, axis=0, weights=weights if sum(weights) > 0 else None)
+
+    by_share = [each for _, each in sorted(parts, key=lambda part: -part[0])]
+    coat = next((each.coat for each in by_share if each.coated), NO_COAT)
+    u, v = mean(lambda each: each.alpha).tolist()
+    return Surface(
+        (u, v),
+        by_share[0].rotation,
+        _rgb(mean(lambda each: each.colour, lambda each: 1 - each.clear)),
+        metalness=float(mean(lambda each: each.metalness)),
+        clear=float(mean(lambda each: each.clear, lambda each: 1 - each.metalness)),
+        eta=float(mean(lambda each: each.eta, lambda each: 1 - each.metalness)),
+        tint=_rgb(mean(lambda each: each.tint, lambda each: each.clear)),
+        film=next((each.film for each in by_share if each.film), None),
+        coat=replace(coat, share=float(mean(lambda each: each.coat.share * each.coated))),
+        by_sight=True,
+    )
 
 
 def _surfaces(material: Material, seen: StackLobes) -> Iterator[Surface]:

@@ -12,9 +12,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from velatura.light.square_bins import grids
-from velatura.model import Model, variance_kind
+from velatura.model import Model
 from velatura.model.base import Query
-from velatura.model.context import Context
 from velatura.optics import fresnel, ggx, refraction
 from velatura.programs.closures import ALPHA_MIN, ViewAndLight
 from velatura.programs.from_stack import Described, Facets
@@ -43,9 +42,8 @@ class Sampled:
 
     @classmethod
     def of(cls, stack: Described, model: Model, wi: Array, nodes: int) -> Sampled:
-        """The light of a stack for wi (M, 3), at about so many nodes for each."""
-        material = stack.material
-        body = model.body(material, variance_kind(material), Context())
+        """The light of a material for wi (M, 3), at about so many nodes for each."""
+        body = stack.body(model)
         drawn = (*WIDTHS, *((max(u, ALPHA_MIN), max(v, ALPHA_MIN), turn) for u, v, turn in stack.brushed))
         each = [_nodes(w, stack.below or 0.0, nodes, drawn) for w in wi]
         which = np.repeat(np.arange(len(wi)), [wo.shape[1] for wo, _ in each])

@@ -29,6 +29,7 @@ class Coat:
     """A coat.
 
     colour: the square of its transmittance along the normal.
+    share: of the surface, that has it.
     darkening: 1 where bounces below it may darken the base, 0 where its colour is that of the coated base.
     """
 
@@ -37,6 +38,7 @@ class Coat:
     rotation: float = 0.0
     colour: Value = WHITE
     darkening: float = 1.0
+    share: float = 1.0
 
 
 NO_COAT = Coat(1.0, (0.0, 0.0))

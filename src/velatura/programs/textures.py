@@ -37,14 +37,16 @@ def _mean(address: Address, value: Varying) -> float | RGB:
     return r, g, b
 
 
-def carried(stack: Stack, found: Means, program: Program, values: Values) -> Iterator[tuple[str, Carried | str]]:
+def carried(stack: Described, found: Means, program: Program, values: Values) -> Iterator[tuple[str, Carried | str]]:
     """Each varying value: its parameter and the image, or its flat name and what stands for it."""
     flat = stack.flat()
     for address, value in stack.values():
         again = address.key == "alpha_v" and flat[address.name[:-1] + "u"] == value
         if not isinstance(value, Varying) or again:
             continue
-        taken = _taken(stack, address, value, found, program, values) if isinstance(value, Texture) else None
+        taken = None
+        if isinstance(stack, Stack) and isinstance(value, Texture):
+            taken = _taken(stack, address, value, found, program, values)
         stands = (
             "the field is replaced by its offset"
             if isinstance(value, Brushing)

@@ -26,7 +26,7 @@ def start(surface: Surface) -> Fitted:
     }
     if surface.coated:
         values |= {
-            "Coat Weight": 1.0,
+            "Coat Weight": surface.coat.share,
             "Coat Roughness": rough(mean_alpha(surface.coat.alpha)),
             "Coat IOR": surface.coat.eta,
             "Coat Tint": rgb(surface.coat.colour),

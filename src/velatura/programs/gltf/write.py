@@ -32,7 +32,8 @@ def start(surface: Surface) -> Fitted:
     }
     if surface.coated:
         values |= {
-            "clearcoatFactor": min(fresnel.normal_incidence(surface.coat.eta) / formulas.COAT_F_0, 1.0),
+            "clearcoatFactor": surface.coat.share
+            * min(fresnel.normal_incidence(surface.coat.eta) / formulas.COAT_F_0, 1),
             "clearcoatRoughnessFactor": roughness(mean_alpha(surface.coat.alpha)),
         }
     if surface.film:

@@ -42,7 +42,7 @@ def start(surface: Surface) -> Fitted:
     }
     if coated:
         values |= {
-            "coat_weight": 1.0,
+            "coat_weight": surface.coat.share,
             "coat_ior": surface.coat.eta,
             "coat_roughness": rough(*coat),
             "coat_roughness_anisotropy": split(*coat),

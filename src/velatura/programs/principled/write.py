@@ -30,7 +30,7 @@ def start(surface: Surface) -> Fitted:
     if surface.coated:
         rough, smooth = formulas.COAT_ALPHA
         values |= {
-            "clearcoat": min(fresnel.normal_incidence(surface.coat.eta) / formulas.COAT_F_0, 1.0),
+            "clearcoat": surface.coat.share * min(fresnel.normal_incidence(surface.coat.eta) / formulas.COAT_F_0, 1.0),
             "clearcoat_gloss": float(np.clip((rough - mean_alpha(surface.coat.alpha)) / (rough - smooth), 0, 1)),
         }
     return values
