@@ -110,8 +110,11 @@ class Described:
 
 
 def blended(parts: Sequence[tuple[float, Surface]]) -> Surface:
-    """The surface that has the means of those of parts, by their shares: of colours, roughnesses and indices; and the
-    shares that are metal and coated, and those of the rest of the base that are clear. Brushing, film and coat are those of the greatest share."""
+    """The surface that has the means of those of parts, by their shares: of colours, roughnesses and indices.
+
+    Shares that are metal and coated add up, and so do those of the rest of the base that are clear. Brushing, film and
+    coat are those of the greatest share.
+    """
 
     def mean(value: Callable[[Surface], Any], weight: Callable[[Surface], float] = lambda _: 1.0) -> Any:
         weights = [share * weight(each) for share, each in parts]
