@@ -223,3 +223,12 @@ def test_a_colour_is_that_of_all_wavelengths_by_themselves() -> None:
         alone = stack({"K": float(absorbed[n]), "S": 3}, eta=float(eta[n]), k=float(k[n]))
         (one,) = paints.reflectance(paints.at_wavelengths(alone, nm[n : n + 1]))
         assert together[n] == pytest.approx(one, abs=3e-4)
+
+
+def test_mixtures_of_materials_have_a_colour_and_no_recipe() -> None:
+    parts = paint(COLOURED), vt.Stack([vt.Diffuse(albedo=(0.1, 0.2, 0.3))])
+    mix = vt.Mix([(0.25, parts[0]), (0.75, parts[1])])
+    of_parts = [paints.paint_colour(part) for part in parts]
+    assert paints.paint_colour(mix) == pytest.approx(0.25 * of_parts[0] + 0.75 * of_parts[1])
+    with pytest.raises(InvalidInput, match="paint: takes a single stack, not a mixture"):
+        inverse.paint(mix, [0.2, 0.2, 0.2])

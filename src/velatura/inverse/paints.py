@@ -19,6 +19,7 @@ from velatura.errors import InvalidInput, one_line, within
 from velatura.optics import kubelka_munk
 from velatura.stack import (
     Address,
+    Described,
     Diffuse,
     Interface,
     InterfaceValues,
@@ -26,10 +27,12 @@ from velatura.stack import (
     MaterialLike,
     Measured,
     Medium,
+    Mix,
     Pigment,
     Spectrum,
     Stack,
     load,
+    single,
     spectrum,
     srgb_weights,
 )
@@ -100,11 +103,14 @@ def paint_colour(material: MaterialLike, specular: bool = False) -> Array:
     Raises:
         InvalidInput: a texture, or [r, g, b] beside spectra.
     """
-    stack = load(material)
-    if not any(isinstance(value, Measured) for value in stack.flat().values()):
-        return np.broadcast_to(reflectance(Material.of(stack), specular), 3).copy()
+    described: Described = load(material)
+    if isinstance(described, Mix):
+        shares = described.weighted("a paint is the same at all points")
+        return np.sum([share * paint_colour(stack, specular) for share, stack in shares], axis=0)
+    if not any(isinstance(value, Measured) for value in described.flat().values()):
+        return np.broadcast_to(reflectance(Material.of(described), specular), 3).copy()
     nm, weights = observer()
-    found = reflectance(at_wavelengths(stack, nm), specular)
+    found = reflectance(at_wavelengths(described, nm), specular)
     return np.asarray(weights @ np.broadcast_to(found, len(nm)))
 
 
@@ -359,12 +365,12 @@ def paint(
         specular: whether the wish includes what the first interface reflects.
 
     Raises:
-        InvalidInput: no pigments, a wish outside 0 to 1, a spectrum as a wish where pigments are [r, g, b], a texture,
-            or a total that the bounds do not allow.
+        InvalidInput: a mixture of materials, no pigments, a texture, a wish outside 0 to 1, a spectrum as a wish where
+            pigments are [r, g, b], or a total that the bounds do not allow.
     """
     from scipy import optimize
 
-    stack = load(material)
+    stack = single(material, "paint")
     places = [(n, k) for n, k in enumerate(stack.layers) if isinstance(k, Medium) and k.pigments]
     pigments = [pigment for _, medium in places for pigment in medium.pigments]
     if not pigments:
