@@ -689,7 +689,7 @@ SCENE = """<scene version="3.0.0">
         </bsdf>
     </bsdf>
     <shape type="sphere">
-        <bsdf type="mask"><bsdf type="principled" id="gold">
+        <bsdf type="mask"><float name="opacity" value="0.75"/><bsdf type="principled" id="gold">
             <rgb name="base_color" value="#ffbb55"/>
             <float name="metallic" value="1"/>
             <texture name="roughness" type="bitmap">
@@ -706,15 +706,16 @@ def test_principled_is_read_from_scenes(write: Write) -> None:
     expected = imports.from_principled({"base_color": [0.2, 0.4, 0.6], "roughness": 0.4, "clearcoat": 1.0})
     assert found.stack.layers == expected.stack.layers
     assert [each.parameter for each in found.left] == ["normal"]
-    gold = imports.read(path, "gold")
-    metal = gold.stack.interfaces[0]
+    gold: Any = imports.read(path, "gold")
+    assert [part.weight for part in gold.stack.mix] == [0.75, None] and gold.left == ()
+    assert gold.stack.mix[1].material.name == "nothing"
+    metal = gold.stack.mix[0].material.interfaces[0]
     assert isinstance(metal.alpha, vt.Texture) and metal.alpha.encoding == "linear"
     reflectance = ((np.array(metal.eta) - 1) ** 2 + np.array(metal.k) ** 2) / (
         (np.array(metal.eta) + 1) ** 2 + np.array(metal.k) ** 2
     )
     encoded = np.array([0xFF, 0xBB, 0x55]) / 255
     np.testing.assert_allclose(reflectance, np.minimum(((encoded + 0.055) / 1.055) ** 2.4, 0.998), atol=1e-4)
-    assert [each.parameter for each in gold.left] == ["bsdf mask"]
 
 
 def test_principled_is_read_from_dictionaries(write: Write, tmp_path: Path) -> None:

@@ -11,7 +11,9 @@ import numpy as np
 
 from velatura.errors import InvalidInput, within
 from velatura.programs import xml
+from velatura.programs.given import Given
 from velatura.programs.imported import Imported, Notes
+from velatura.programs.parameters import Input
 from velatura.programs.principled import read as principled
 from velatura.programs.values import linear, listed
 from velatura.programs.xml import Element
@@ -36,7 +38,9 @@ def materials(path: Path) -> tuple[dict[str, Callable[[Notes], Imported]], None]
     def reader(element: Element, name: str) -> Callable[[Notes], Imported]:
         def read(notes: Notes) -> Imported:
             with within(f"{path}: {name}"):
-                return principled.read(_values(element, path.parent, default, notes), name, notes)
+                values = _values(element, path.parent, default, notes)
+                cover = _cover(element, path.parent, default, notes)
+                return principled.read(values, name, notes, cover)
 
         return read
 
@@ -66,10 +70,21 @@ def of_dict(described: Mapping[str, Any], notes: Notes) -> Imported:
     return principled.read({name: value for name, value in values.items() if value is not None}, notes=notes)
 
 
+def _cover(element: Element, folder: Path, default: Mapping[str, str], notes: Notes) -> float | Texture:
+    """The share of a surface that a mask around a BSDF leaves; BSDFs of other types are noted."""
+    share: float | Texture = 1.0
+    for around in element.outwards():
+        if around is element or around.tag != "bsdf" or around.get("type") in _AROUND:
+            continue
+        if around.get("type") != "mask" or share != 1:
+            notes.add(f"bsdf {around.get('type')}", "", "the principled in it is read alone")
+            continue
+        values = {key: value for key, value in _values(around, folder, default, notes).items() if key == "opacity"}
+        share = Given(values, (Input("opacity", (0.5, 0.5, 0.5)),), {}, notes).share("opacity")
+    return share
+
+
 def _values(element: Element, folder: Path, default: Mapping[str, str], notes: Notes) -> dict[str, Any]:
-    around = element.parent
-    if around is not None and around.tag == "bsdf" and around.get("type") not in _AROUND:
-        notes.add(f"bsdf {around.get('type')}", "", "the principled in it is read alone")
     values: dict[str, Any] = {}
     for each in element.children:
         text = each.get("value") or ""
@@ -77,6 +92,8 @@ def _values(element: Element, folder: Path, default: Mapping[str, str], notes: N
         value: Any = None
         if each.tag in ("float", "integer") or each.tag in ("rgb", "srgb", "spectrum"):
             value = _numbers(text)
+        elif each.tag == "bsdf":
+            continue
         elif each.tag == "texture":
             inside: dict[str, Any] = {part.name: part.get("value") for part in each.children}
             inside |= {"type": each.get("type"), "raw": inside.get("raw") == "true"}

@@ -17,7 +17,7 @@ from velatura.programs.principled import formulas, parameters
 from velatura.programs.surface import NO_COAT, Coat, Shares, Surface
 from velatura.programs.to_stack import imported
 from velatura.programs.values import changed
-from velatura.stack import RGB
+from velatura.stack import RGB, Texture
 from velatura.stack.spectra import LUMINANCE
 
 PARAMETERS = (*parameters.PARAMETERS, Input("specular", 0.5))
@@ -25,8 +25,10 @@ RATES = ("diffuse_reflectance_sampling_rate", "main_specular_sampling_rate", "cl
 COAT = 1.5  # index of a clearcoat, whose reflectance at the normal the plugin has
 
 
-def read(values: Mapping[str, Any], name: str = "", notes: Notes | None = None) -> Imported:
-    """The stack nearest to a `principled`, whose coat neither darkens nor absorbs.
+def read(
+    values: Mapping[str, Any], name: str = "", notes: Notes | None = None, cover: float | Texture = 1.0
+) -> Imported:
+    """The stack nearest to a `principled`, whose coat neither darkens nor absorbs, on a share of a surface.
 
     Raises:
         InvalidInput: an unknown parameter, both of `eta` and `specular`, or a value of another kind.
@@ -37,7 +39,9 @@ def read(values: Mapping[str, Any], name: str = "", notes: Notes | None = None) 
     given = Given({key: value for key, value in values.items() if key not in RATES}, PARAMETERS, {}, notes)
     eta = given.index("eta") if "eta" in values else 2 / (1 - np.sqrt(0.08 * given.number("specular"))) - 1
     metal = given.share("metallic")
-    shares = Shares(coat=given.share("clearcoat"), metal=metal, clear=given.share("spec_trans") if metal != 1 else 0.0)
+    shares = Shares(
+        cover, coat=given.share("clearcoat"), metal=metal, clear=given.share("spec_trans") if metal != 1 else 0.0
+    )
     given.leave("sheen", parts.FIBRES)
     given.leave("flatness", parts.LAMBERTIAN)
     return imported(
