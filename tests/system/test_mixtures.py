@@ -313,14 +313,12 @@ def test_mixtures_keep_the_laws(mix: vt.Mix) -> None:
     assert not report["energy"].declared or mix is NESTED
 
 
-def test_baked_and_inverse_refuse_in_one_line(run: Any, tmp_path: Path) -> None:
+def test_the_inverse_refuses_in_one_line(run: Any, tmp_path: Path) -> None:
     vt.save(WORN, tmp_path / "worn.yaml")
     path = str(tmp_path / "worn.yaml")
     for arguments in (
-        ("export", path, "--to", "glsl"),
         ("coat", path, "--eta", "1.5", "--alpha", "0.1"),
         ("simplify", path, "--interfaces", "1"),
-        ("compare", path, "--models", "openpbr", "--paths", "100"),
     ):
         status, out, err = run(*arguments)
         assert status == 2 and not out
