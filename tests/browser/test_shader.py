@@ -22,6 +22,7 @@ from agreement import (
     in_browser,
     in_javascript,
     in_numpy,
+    mixed_case,
     placed,
     random_case,
     read_back,
@@ -67,6 +68,17 @@ def test_the_shader_is_the_model(pattern: int, model: str, switches: dict[str, s
     assert found.value < 1e-3
     assert found.density < 1e-3
     assert found.drawn < 1e-4
+
+
+@pytest.mark.parametrize(("patterns", "model"), [((9, 0, 18), "velatura"), ((9, 15, 9), "weier2020")])
+def test_the_shader_of_a_mixture_is_the_model(patterns: tuple[int, ...], model: str, page: chromium.Browser) -> None:
+    """Expected: values, densities and samples within the same bounds, of a solved mixture and of one in closed form."""
+    case = mixed_case([PATTERNS[k] for k in patterns], 60, np.random.default_rng(7))
+    found, _, _ = in_browser(case.whole, None, shader(case.whole.stack, model), page)
+    truth = case.in_numpy(model)
+    apart = differences(truth, replace(found, energy=truth.energy, alpha=truth.alpha))
+    assert max(apart.value, apart.density) < 1e-3
+    assert apart.drawn < 1e-4
 
 
 def test_facets_wider_across_the_tangent_are_not_turned(page: chromium.Browser) -> None:

@@ -157,6 +157,15 @@ def test_the_light_of_a_mixture_is_the_weighted_sum(target: str) -> None:
     assert np.abs(alike.baked_albedo - each[1].baked_albedo).max() < 0.01
 
 
+def test_the_bake_of_a_mixture_is_compared_with_walks() -> None:
+    """Expected: the albedo of walks through both parts, to the loss that is stated and 4 standard errors."""
+    mix = vt.Mix([(0.4, COPPER), (None, PAINT)])
+    found, made = vt.compare(mix, models=["openpbr"], paths=4000, seed=3, microsurface=True), bake(mix, "openpbr")
+    stated = np.abs(made.baked_albedo - made.albedo).max()
+    off = np.abs(found.models["openpbr"].evaluated - found.truth.albedo)
+    assert np.all(off < stated + 4 * found.albedo_error)
+
+
 def test_a_mixture_stays_in_its_file_and_its_losses_name_parts(tmp_path: Path) -> None:
     """Expected: the file holds the mixture, which is read again; a mask is replaced by its mean."""
     vt.scenes.write_image(np.linspace(0, 1, 16, dtype=np.float32).reshape(4, 4, 1), tmp_path / "mask.exr")
