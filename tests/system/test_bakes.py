@@ -148,6 +148,13 @@ def test_metalness_and_coverage_are_shares_of_a_mixture(target: str, metal: str,
     assert bake(coated, target).values[coat] == pytest.approx(0.4, abs=1e-6)
 
 
+def test_a_black_material_is_black_in_all() -> None:
+    """Expected: a fit, where no light sets a scale."""
+    black = vt.Stack([vt.Interface(eta=1.0, alpha=0.2), vt.Diffuse(albedo=0.0)])
+    for target in TARGETS:
+        assert bake(vt.Mix([(0.0, PAINT), (None, black)]), target).baked_albedo.max() < 0.01
+
+
 @pytest.mark.parametrize("target", TARGETS)
 def test_the_light_of_a_mixture_is_the_weighted_sum(target: str) -> None:
     """Expected: the albedo that is compared, to the errors of quadrature; of two equal parts the parameters of one."""

@@ -76,7 +76,7 @@ def export(
     """A material for other programs.
 
     Args:
-        material: a stack, a file, or a preset's name.
+        material: a stack, a mixture, a file, or a preset's name.
         to: one of `FORMATS`: a shader in "glsl" (ES 3.00), "glsl450", "vulkan" (GLSL), "hlsl", "slang" or "wgsl"; a
             shader of closures, "osl", or "blender", a script that makes a material of it; "mtlx", a graph of MaterialX;
             "json", the material with its numbers; "mitsuba-xml", a scene to be included; "python", a script that
@@ -93,8 +93,8 @@ def export(
         folder: where the text will lie, so that a scene may name its textures relative to it.
 
     Raises:
-        InvalidInput: not a valid material, an unknown format, model, switch or value, or a stack that the format does
-            not hold.
+        InvalidInput: not a valid material, an unknown format, model, switch or value, or a material that the format
+            does not hold.
     """
     from velatura.model import DEFAULT, named
     from velatura.stack import load

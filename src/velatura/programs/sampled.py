@@ -68,7 +68,7 @@ class Sampled:
     def _scale(self) -> Array:
         """Square roots of weights over the light of each direction of incidence, reflected or transmitted, (N,)."""
         sides = [each.mean(axis=0) for each in self._energies]
-        count = sum(side.max() > 0 for side in sides)
+        count = max(sum(side.max() > 0 for side in sides), 1)  # of black materials, too
         share = [self.share / (count * np.maximum(side, FAINT)) for side in sides]
         return np.asarray(np.sqrt(self.weight * np.where(self.pair.wo[2] > 0, *(side[self.which] for side in share))))
 
