@@ -28,7 +28,7 @@ import yaml
 
 import velatura as vt
 from velatura import api, comparison, figures, inverse, sweeps
-from velatura.benchmark import scores, stacks
+from velatura.benchmark import cost, scores, stacks
 from velatura.cli import app
 from velatura.comparison import evaluated_lobes, pictures, plugins
 from velatura.editor import server
@@ -200,6 +200,8 @@ NUMBERS: list[tuple[Any, str, Any]] = [
     (evaluated_lobes, "LIT_SAMPLES", 2**14),
     (pictures, "SAMPLES", 4),
     (scores, "SAMPLES", 6),
+    (cost, "POWER", 12),
+    (cost, "TURNS", 3),
     (closures, "PLANE", (16, 9)),
     (fit, "NODES", 40),
     (fit, "AZIMUTHS", (0.0,)),
