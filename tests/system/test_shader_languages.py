@@ -211,6 +211,12 @@ def test_a_black_material_has_a_shader(to: str) -> None:
     assert vt.export(black, to)
 
 
+@pytest.mark.parametrize("to", ["osl", "mtlx"])
+def test_a_medium_on_glass_has_closures(to: str) -> None:
+    """Its lower side ends with a medium."""
+    assert vt.export(vt.Stack([FOG, vt.Interface(eta=1.5, alpha=0.1)]), to)
+
+
 def test_what_varies_is_not_baked(tmp_path: Path) -> None:
     (tmp_path / "rough.png").touch()
     stack = vt.Stack([vt.Interface(eta=1.5, k=1, alpha={"texture": str(tmp_path / "rough.png")})])

@@ -164,6 +164,19 @@ def test_a_medium_is_alone_without_steps_of_the_index(layers: list[Any], alone: 
     assert solve.layout_of([Material.of(Stack(layers))]).alone == alone
 
 
+def test_a_medium_alone_is_alike_from_both_sides() -> None:
+    """Expected: values and densities of directions turned over, of a slab whose interfaces have no step of the index."""
+    found = body(
+        [Interface(eta=1.0, alpha=0.1), Medium(sigma_s=(0.9, 0.7, 0.5), sigma_a=0.1, g=0.7), Interface(eta=1.0)]
+    )
+    wi = directions(0.6, 0 * TURN)
+    for x, y, z in (directions(0.5, TURN + 0.1), directions(-0.7, TURN + 0.1)):
+        above = found.eval_pdf(wi, (x, y, z))
+        below = found.eval_pdf((wi[0], wi[1], -wi[2]), (x, y, -z))
+        for a, b in zip(above, below):
+            np.testing.assert_allclose(a, b, rtol=1e-9)
+
+
 @pytest.mark.parametrize("phase", ["rayleigh", {"table": [(0, 3), (60, 0.3), (90, 0.1), (180, 0.2)]}])
 def test_two_lobes_have_the_moments_of_a_phase_function(phase: Any) -> None:
     """Expected: the first three, or two of one that falls off as no lobe does, by quadrature of the densities."""
