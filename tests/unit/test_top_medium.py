@@ -165,7 +165,7 @@ def test_a_medium_is_alone_without_steps_of_the_index(layers: list[Any], alone: 
 
 
 def test_a_medium_alone_is_alike_from_both_sides() -> None:
-    """Expected: values and densities of directions turned over, of a slab whose interfaces have no step of the index."""
+    """Expected: values and densities of directions turned over; no interface of the slab has a step of the index."""
     found = body(
         [Interface(eta=1.0, alpha=0.1), Medium(sigma_s=(0.9, 0.7, 0.5), sigma_a=0.1, g=0.7), Interface(eta=1.0)]
     )
