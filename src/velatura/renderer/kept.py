@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections import OrderedDict
 from collections.abc import Callable, Hashable
-from dataclasses import fields, is_dataclass
+from dataclasses import is_dataclass
 from threading import Lock
 from typing import Any, TypeVar
 
@@ -52,4 +52,4 @@ def _size(value: Any) -> int:
         return value.nbytes
     if isinstance(value, tuple | list):
         return sum(map(_size, value))
-    return sum(_size(getattr(value, x.name)) for x in fields(value)) if is_dataclass(value) else 0
+    return sum(map(_size, vars(value).values())) if is_dataclass(value) else 0

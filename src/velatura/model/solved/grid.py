@@ -6,6 +6,7 @@ Stacks look alike from opposite sides, and mirrored in the axes that all of thei
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -60,15 +61,15 @@ class Grid:
     def count(self) -> int:
         return self.cosines * self.turns
 
-    @property
+    @cached_property
     def cosine(self) -> Array:
         return np.repeat(np.maximum(self.nodes**2, COS_ON_GRID_MIN), self.turns)
 
-    @property
+    @cached_property
     def phi(self) -> Array:
         return np.tile(np.pi * np.arange(self.turns) / self.turns, self.cosines)
 
-    @property
+    @cached_property
     def directions(self) -> tuple[Array, Array, Array]:
         sine = np.sqrt(1 - self.cosine * self.cosine)
         return sine * np.cos(self.phi), sine * np.sin(self.phi), self.cosine
@@ -148,20 +149,20 @@ class Folded:
     def count(self) -> int:
         return self.grid.cosines * len(self.kept)
 
-    @property
+    @cached_property
     def cosine(self) -> Array:
         return self._of(self.grid.cosine)
 
-    @property
+    @cached_property
     def phi(self) -> Array:
         return self._of(self.grid.phi)
 
-    @property
+    @cached_property
     def directions(self) -> tuple[Array, Array, Array]:
         x, y, z = map(self._of, self.grid.directions)
         return x, y, z
 
-    @property
+    @cached_property
     def at_cosines(self) -> tuple[Array, Array, Array]:
         """One direction for each cosine."""
         x, y, z = (each.reshape(-1, len(self.kept))[:, 0] for each in self.directions)

@@ -270,11 +270,12 @@ def features(
 
 def _corrected(first: Tensor, seen: dict[str, Array]) -> Tensor:
     """The tensor with its axes scaled, and then the components in the plane and across it."""
-    axes, apart = np.zeros((2, *first.xx.shape)), np.zeros_like(first.xx)
-    for (a, b), along, to_difference in fitted.CORRECTION:
-        product = np.broadcast_to(seen[a] * seen[b], axes.shape)
-        axes = axes + along * product
-        apart = apart + to_difference * product.mean(axis=0) * seen["slant"]
+    shape = 2, *first.xx.shape
+    each = {name: np.broadcast_to(x, shape) for name, x in seen.items()}
+    products = np.array([each[a] * each[b] for (a, b), _, _ in fitted.CORRECTION])
+    along, to_difference = np.transpose([numbers for _, *numbers in fitted.CORRECTION])
+    axes = np.tensordot(along, products, axes=1)
+    apart = np.tensordot(to_difference, products.mean(axis=1), axes=1) * seen["slant"]
     fading = seen["steps"] / (seen["steps"] + fitted.CORRECTION_FADE)
     u, v, x = (np.exp(np.clip(fading * each, -fitted.CORRECTION_MAX, fitted.CORRECTION_MAX)) for each in (*axes, apart))
     scaled = Tensor.turned(u * first.width(first.angle), v * first.width(first.angle + AXES[1]), first.angle)
