@@ -67,7 +67,9 @@ def calls(monkeypatch: pytest.MonkeyPatch) -> dict[str, Any]:
         transmitted = SimpleNamespace(**lobe) if seen.get("transmits") else None
         lists = {field: [value, value] for field, value in lobe.items()}
         others = {"remainder": np.full((3, n), 0.25), "passed": np.zeros((3, n)), "absorbed": np.full((3, n), 0.5)}
-        return SimpleNamespace(**lists, transmitted=transmitted, **others)
+        found = SimpleNamespace(**lists, transmitted=transmitted, **others)
+        found.parts = [found]
+        return found
 
     def render(stack: Any, progress: Callable[[int, int], None], **options: Any) -> np.ndarray:
         seen.update(stack=stack, **options)

@@ -344,6 +344,7 @@ def test_names_state_their_source() -> None:
         nm, expected_copper = (column[(palik[0] > 400) & (palik[0] < 700)] for column in palik)
         np.testing.assert_allclose(np.interp(nm, *copper), expected_copper, atol=0.01)
         assert np.interp(495.94, *gold) == pytest.approx(expected, abs=1e-3)
-    conductor = json_schema()["properties"]["layers"]["items"]["oneOf"][0]["properties"]["interface"]["properties"]
+    layers = json_schema()["$defs"]["stack"]["properties"]["layers"]
+    conductor = layers["items"]["oneOf"][0]["properties"]["interface"]["properties"]
     described = dict(zip(conductor["conductor"]["enum"], conductor["conductor"]["enumDescriptions"], strict=True))
     assert described["Au"] == spectra.source("Au")

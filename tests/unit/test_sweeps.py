@@ -58,7 +58,7 @@ def number(stack: vt.Stack, seed: int) -> dict[str, Any]:
     ("changes", "message"),
     [
         ({"material": "coated-gol"}, "material: unknown preset 'coated-gol' (did you mean coated-gold?)"),
-        ({"material": 3}, "material: a material must be a stack, a file or the name of a preset, got 3"),
+        ({"material": 3}, "material: a material must be a stack, a mixture, a file or the name of a preset, got 3"),
         ({"sampling": "sobel"}, "sampling: must be one of grid, random, sobol, got 'sobel'"),
         ({"samplin": "grid"}, "unknown key 'samplin' (did you mean sampling?)"),
         ({"count": 3}, "count: not with sampling: grid, whose steps give it"),

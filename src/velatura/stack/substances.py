@@ -218,7 +218,7 @@ class Entry:
 
     @property
     def short(self) -> str:
-        """The substance, and who measured it, as a menu has them: "Gold (Johnson and Christy 1972)"."""
+        """The substance, and in brackets who measured it, as a menu has them."""
         words = re.search(r" \((.+)\)$", self.book)
         substance = (words[1] if words else self.book).split(", ")[0]
         measured = re.sub(r"n(,k)?(\(o\))? [\d.e–]+ µm(; )?", "", self.title).strip(" :;")
