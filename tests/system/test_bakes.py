@@ -430,6 +430,10 @@ def foreign(rng: np.random.Generator, metal: float) -> dict[str, Any]:
     return values
 
 
+def _kinds(material: Any) -> list[tuple[str, ...]]:
+    return [stack.kinds for _, stack in material.leaves()]
+
+
 @pytest.mark.parametrize("metal", [0.0, 1.0])
 def test_numbers_of_gltf_keep_what_the_stack_holds(metal: float) -> None:
     """Expected: by numbers alone, metal stays metal, coats and films stay, a clearcoat keeps its weight and roughness,
@@ -451,7 +455,7 @@ def test_numbers_of_gltf_keep_what_the_stack_holds(metal: float) -> None:
         for name in same:
             assert made[name] == pytest.approx(given[name], abs=0.02), (name, drawn)
         again = {name: value for name, value in made.items() if np.all(np.isfinite(value))}
-        assert imported_gltf(again).stack.kinds == stack.kinds
+        assert _kinds(imported_gltf(again).stack) == _kinds(stack)
 
 
 @pytest.mark.parametrize("target, ending", [("gltf", ".gltf"), ("openpbr", ".mtlx"), ("mitsuba-principled", ".xml")])
