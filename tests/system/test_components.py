@@ -113,7 +113,8 @@ def test_components_sum_to_the_whole_and_are_sampled_alone(name: str, form: str)
         np.testing.assert_allclose(np.array(weight) * np.array(pdf), value, rtol=1e-3, atol=1e-6)
         one, other = np.array(weight)[0], (np.array(values[k][0]) * (4 * np.pi))[0]
         error = np.hypot(one.std(), other.std()) / np.sqrt(n)
-        assert abs(one.mean() - other.mean()) < 5 * error
+        # Both are 0 of a lobe whose light waves have
+        assert abs(one.mean() - other.mean()) <= 5 * error
 
 
 @pytest.mark.parametrize(

@@ -95,6 +95,7 @@ MODEL = {
     10: ("diffuse transmission", {"transmission/internal_reflections"}),
     11: ("medium on top", {"lobes/top_medium"}),
     12: ("light through a medium alone", {"lobes/top_medium"}),
+    13: ("waves of wide light", {"lobes/wide"}),
 }
 
 

@@ -12,6 +12,11 @@ BRUSHED_FROM = (
     0.3  # difference of two roughnesses, as share of the larger, from which light keeps its momentum along facets
 )
 PASSED_ON = 0.75  # share of repeated light that passes brushed facets in the directions of second events
+# Share of repeated light that passes isotropic facets in the directions of second events, at least; the step of the
+# logarithm of the index below which it is more; the roughness where it begins, and is whole
+ONWARD = 0.3
+ONWARD_STEP = 0.3
+ONWARD_FROM = 0.2, 0.4
 BLOCKED = (0.004, 0.014)  # shares of blocked light below which, and above which, its share comes from the tables
 BLOCKED_IN_THE_END = (0.9, 0.15)  # share of little blocked light that is reflected, towards a rarer medium and a denser
 # Step of the logarithm of the index that refracted light which meets further facets still passes, where these are met
@@ -66,3 +71,15 @@ BOUNCES = 0.3  # of the two faces of the slab that light bounces in
 COS_OF_BOUNCES_MIN = 0.22  # at which slabs are crossed, for widths
 WIDE = 0.05  # roughness of bounced light of which a lobe holds half
 DIFFUSE_ALPHA = 0.5, 0.9  # roughness from which scattering is diffuse in part, and as a whole
+
+# Light that is wider than lobes (wide.py): where it begins, and from where on it is all -------------------------------
+
+WIDE_FIRST = 0.1, 0.2  # roughness of the roughest interface
+WIDE_SECOND = 0.03, 0.1  # and of the next one
+WIDE_STEP = 0.1  # of the logarithm of the index, below which an interface counts as a smoother one
+WIDE_STRETCH = 1.1, 1.5  # ratio of two roughnesses up to which an interface counts, and from which none does
+WIDE_SOLID = (
+    0.02,
+    0.1,
+)  # of the logarithm of the index below over that above, up to which a stack is a pane, and a solid
+WIDE_ERROR = 0.025, 0.12  # of waves, up to which they have all light of a direction, and from which none

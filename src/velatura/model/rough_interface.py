@@ -104,6 +104,17 @@ class Facets:
         return min(self.brushed / fitted.BRUSHED_FROM, 1)
 
     @property
+    def onward(self) -> float:
+        """Share of the light that meets rough facets often, and passes, which leaves as it does after second events:
+        the more, the less the step of the index turns it."""
+        if self.opaque or self.final:
+            return 0.0
+        begin, whole = fitted.ONWARD_FROM
+        rough = min(max((mean_alpha(self) - begin) / (whole - begin), 0.0), 1.0)
+        little = float(np.exp(-((self.step / fitted.ONWARD_STEP) ** 2)))
+        return rough * (fitted.ONWARD + (1 - fitted.ONWARD) * little)
+
+    @property
     def ratio(self) -> float:
         """The greater of both roughnesses over the lesser."""
         return max(self.alpha_u, self.alpha_v, ALPHA_MIN) / max(min(self.alpha_u, self.alpha_v), ALPHA_MIN)

@@ -22,7 +22,7 @@ from velatura.model.roughness_maps import RoughnessMap
 from velatura.model.smooth_interface import SmoothInterface
 from velatura.model.solved.columns import Column, Columns, Declaration
 from velatura.model.solved.guards import BELOW_ONE, COS_OF_DIRECTIONS_MIN, ENERGY_EPS
-from velatura.model.solved.lobes import refracted_lobe, top_medium
+from velatura.model.solved.lobes import refracted_lobe, top_medium, wide
 from velatura.model.solved.lobes.refracted_lobe import MediumIndex, RefractedLobe
 from velatura.model.solved.lobes.remainder import Remainder, RemainderSamples
 from velatura.model.solved.lobes.top_medium import TopMedium, TopSamples
@@ -76,6 +76,7 @@ class Side:
     """One side of a solved material, in a renderer's numbers; a colour is made of `colours` channels.
 
     The remainder is drawn by `samples`. With it goes what the medium `top` scatters back, None where none is apart.
+    Light that is too wide for lobes has columns of its own in sides that are `wide`.
     """
 
     curves: Any
@@ -87,12 +88,12 @@ class Side:
     colours: int
     kind: type[Variance]
     top: TopMedium | None = None
+    wide: bool = False
 
     @property
     def declaration(self) -> Declaration:
-        return Declaration(
-            len(self.shapes), len(fields(self.kind)), self.transmission is not None, self.top is not None
-        )
+        passes, top = self.transmission is not None, self.top is not None
+        return Declaration(len(self.shapes), len(fields(self.kind)), passes, top, self.wide)
 
     def at(self, w: Direction) -> Columns:
         """The columns for a direction above."""
@@ -117,14 +118,16 @@ class Side:
         """What light from a direction above sees of the reflected part of number k alone, which is the first one. In
         NumPy."""
         weight, *others = self._only(w, self.declaration.part(k))
-        of_top = others[0] if self.top and k == len(self.shapes) else None
-        columns = Columns([weight], [tuple(others)], [], [], weight, 0.0, 0.0, None, None, of_top)
+        roughness, beyond = (others, []) if k < len(self.shapes) else ([], others)
+        of_top, beyond = (beyond[0], beyond[1:]) if self.top and beyond else (None, beyond)
+        columns = Columns([weight], [tuple(roughness)], [], [], weight, 0.0, 0.0, None, None, of_top, beyond)
         return replace(self, shapes=self.shapes[k : k + 1]).given(w, columns)
 
     def through(self, w: Direction) -> SideView:
         """What light from a direction above sees of all that passes. In NumPy."""
-        passes = Parts(*self._only(w, self.declaration.through))
-        return replace(self, shapes=(), top=None).given(w, Columns([], [], [], [], 0.0, 0.0, 0.0, passes, None))
+        found, count = self._only(w, self.declaration.through), len(self.declaration.parts)
+        columns = Columns([], [], [], [], 0.0, 0.0, 0.0, Parts(*found[:count]), None, wide_passed=found[count:])
+        return replace(self, shapes=(), top=None).given(w, columns)
 
     def _only(self, w: Direction, chosen: Sequence[int]) -> list[Value]:
         """Values of columns of some numbers; others are not read."""
@@ -208,7 +211,23 @@ class SideView:
             return refracted_lobe.eval_pdf(self.lobes[k], self._along_plane(i), self._in_plane(o))
         top = self.top
         rest = self.polynomial.value(i, o) if top is None else top_medium.value(self.polynomial, top, i, o)
-        return self.columns.scale * rest, self.samples.density(i, o)
+        rest = self.columns.scale * rest
+        if self.columns.wide_reflected:
+            energy, *numbers = self.columns.wide_reflected
+            rest = rest + wide.value(energy, numbers, i, o)
+        return rest, self.samples.density(i, o)
+
+    def through(self, i: Direction, o: Direction, whole: bool = False) -> tuple[Value, Value]:
+        """f |cos theta_o| and density of what passes, with the `whole` of what lobes have of light that goes straight
+        through, or its weight."""
+        passes = self.columns.passes
+        assert self.transmission and passes
+        passes = replace(passes, straight=passes.narrow) if whole else passes
+        found, density = combined.eval_pdf(self.transmission, passes, i, o)
+        if self.columns.wide_passed:
+            energy, *numbers = self.columns.wide_passed
+            found = found + combined.wide_value(self.transmission, energy, numbers, i, o)
+        return found, density
 
     def out_of(self, lobe: RefractedLobe, i: Direction, u1: Value, u2: Value) -> Direction:
         """A direction drawn from a lobe."""
@@ -357,7 +376,7 @@ def eval_pdf(
         value = value + (part if wanted else 0 * part)
     columns = of.columns
     if of.transmission and columns.passes:
-        through, pdf = combined.eval_pdf(of.transmission, columns.passes, i, o)
+        through, pdf = of.through(i, o)
         returned: Value = 0.0
         if back and back.transmission and back.columns.passes:
             through, pdf, returned = exchanged(of, back, eta, wi, wo)
@@ -380,9 +399,8 @@ def eval_pdf(
 def exchanged(of: SideView, back: SideView, eta: Value, wi: Direction, wo: Direction) -> tuple[Value, Value, Value]:
     """Mean of what passes there and back, with all that goes straight through, and the densities there and back."""
     i, o, i_back, o_back = upright(wi, wi), upright(wo, wi), upright(wi, wo), upright(wo, wo)
-    assert of.transmission and of.columns.passes and back.transmission and back.columns.passes
-    there, density = combined.eval_pdf(of.transmission, replace(of.columns.passes, straight=1.0), i, o)
-    other, returned = combined.eval_pdf(back.transmission, replace(back.columns.passes, straight=1.0), o_back, i_back)
+    there, density = of.through(i, o, True)
+    other, returned = back.through(o_back, i_back, True)
     cosines = ops.absolute(wo[2]) / ops.maximum(ops.absolute(wi[2]), COS_OF_DIRECTIONS_MIN)
     return 0.5 * (there + other * (cosines * eta * eta)), density, returned
 

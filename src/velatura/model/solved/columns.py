@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, field, fields
 from itertools import accumulate
 
+from velatura.model.solved.lobes import wide
 from velatura.model.solved.transmission.combined import Parts
 from velatura.ops import Value
+
+WIDE_SIDES = "wide_reflected", "wide_passed"
 
 
 @dataclass(frozen=True)
@@ -26,8 +29,8 @@ class Column:
 
 @dataclass(frozen=True)
 class Declaration:
-    """The columns of a side with so many lobes, of roughnesses of so many entries, and with what passes, and a medium
-    on top, or without.
+    """The columns of a side with so many lobes, of roughnesses of so many entries, and with what passes, a medium on
+    top, and light that is too wide for lobes, or without.
 
     They are in the order in which they are read, those of densities first. The chance of the remainder is what others
     leave.
@@ -37,6 +40,7 @@ class Declaration:
     entries: int
     passes: bool
     top: bool = False
+    wide: bool = False
 
     @property
     def columns(self) -> list[Column]:
@@ -44,9 +48,17 @@ class Declaration:
         found += [Column("weight", colour=True)] * self.lobes + [Column("scale", colour=True)]
         found += [Column("energy", colour=True, energy=True)] * self.lobes + [Column("rest", colour=True, energy=True)]
         if self.passes:
-            found += [Column(f"passed_{part.name}", colour=part.name in Parts.COLOURS) for part in fields(Parts)]
+            found += [Column(f"passed_{name}", colour=name in Parts.COLOURS) for name in self.parts]
             found.append(Column("passed", colour=True, energy=True))
-        return [*found, Column("of_top")] if self.top else found
+        found += [Column("of_top")] if self.top else []
+        for name in WIDE_SIDES if self.wide else ():
+            found += [Column(f"{name}_energy", colour=True), *[Column(name)] * wide.COUNT]
+        return found
+
+    @property
+    def parts(self) -> list[str]:
+        """Names of the columns of `Parts`."""
+        return [part.name for part in fields(Parts) if self.wide or part.name not in Parts.OF_WIDE]
 
     def groups(self, colours: int) -> list[int]:
         """Which rows are read together: 1 for those that are read seldom."""
@@ -63,16 +75,19 @@ class Declaration:
 
     def part(self, k: int) -> list[int]:
         """Numbers of the columns that make the reflected part of number k: weight and roughness, or of the last one,
-        the remainder, scale and the share of a medium on top, if there is one."""
+        the remainder, scale, the share of a medium on top, if there is one, and what is wide."""
         each = self.entries + 1
         if k < self.lobes:
             return [each * self.lobes + k, *range(k * each, k * each + self.entries)]
-        return [each * self.lobes + k, *([len(self.columns) - 1] if self.top else [])]
+        return [each * self.lobes + k, *self._named("of_top"), *self._named("wide_reflected")]
 
     @property
     def through(self) -> list[int]:
         """Numbers of the columns that make what passes."""
-        return [k for k, column in enumerate(self.columns) if column.name.startswith("passed_")]
+        return [*self._named("passed_"), *self._named("wide_passed")]
+
+    def _named(self, begin: str) -> list[int]:
+        return [k for k, column in enumerate(self.columns) if column.name.startswith(begin)]
 
     def _begins(self, colours: int) -> list[int]:
         return list(accumulate((column.rows(colours) for column in self.columns), initial=0))
@@ -84,8 +99,9 @@ class Declaration:
             return [row for name in names for row in self.first_rows(name, colours)]
 
         found = [(energy, [weight]) for energy, weight in zip(rows("energy"), rows("weight"))]
-        found += [(row, rows("scale")) for row in rows("rest")]
-        return found + [(row, rows(*(f"passed_{part}" for part in Parts.COLOURS))) for row in rows("passed")]
+        found += [(row, rows("scale", "wide_reflected_energy")) for row in rows("rest")]
+        passed = rows(*(f"passed_{part}" for part in Parts.COLOURS), "wide_passed_energy")
+        return found + [(row, passed) for row in rows("passed")]
 
     def chances(self, colours: int) -> list[int]:
         """Rows of shares of samples, without that of the remainder."""
@@ -102,11 +118,14 @@ class Declaration:
         roughness = [tuple(numbers[k : k + self.entries]) for k in range(0, len(numbers), self.entries)]
         chance, passes, passed = 1 - sum(chances), None, None
         if self.passes:
-            passes = Parts(*(by_name[f"passed_{part.name}"][0] for part in fields(Parts)))
+            passes = Parts(*(by_name[f"passed_{name}"][0] for name in self.parts))
             passed, chance = by_name["passed"][0], chance - passes.share
         (scale,), (rest,) = by_name["scale"], by_name["rest"]
         of_top = by_name["of_top"][0] if self.top else None
-        return Columns(weights, roughness, chances, energies, scale, chance, rest, passes, passed, of_top)
+        reflecting, passing = ([*by_name.get(f"{name}_energy", []), *by_name.get(name, [])] for name in WIDE_SIDES)
+        return Columns(
+            weights, roughness, chances, energies, scale, chance, rest, passes, passed, of_top, reflecting, passing
+        )
 
 
 @dataclass(frozen=True)
@@ -114,7 +133,8 @@ class Columns:
     """One direction's values, or arrays (C, M) and (M,) over directions.
 
     `weights`, `roughness`, `chances` and `energies` are those of lobes; of the remainder `scale`, `chance` and `rest`.
-    `of_top` is the share of its samples that a medium on top has, None without one.
+    `of_top` is the share of its samples that a medium on top has, None without one. `wide_reflected`, which is of the
+    remainder, and `wide_passed` are an energy, a colour, and numbers of `velatura.model.solved.lobes.wide`, or nothing.
     """
 
     weights: list[Value]
@@ -127,16 +147,21 @@ class Columns:
     passes: Parts | None
     passed: Value | None
     of_top: Value | None = None
+    wide_reflected: list[Value] = field(default_factory=list)
+    wide_passed: list[Value] = field(default_factory=list)
 
     @property
     def declaration(self) -> Declaration:
         entries = len(self.roughness[0]) if self.roughness else 0
-        return Declaration(len(self.weights), entries, self.passes is not None, self.of_top is not None)
+        passes, top = self.passes is not None, self.of_top is not None
+        return Declaration(len(self.weights), entries, passes, top, bool(self.wide_passed))
 
     @property
     def all(self) -> list[Value]:
         """Values in the order of the declaration."""
         found = [x for roughness, chance in zip(self.roughness, self.chances) for x in (*roughness, chance)]
         found += [*self.weights, self.scale, *self.energies, self.rest]
-        found += [*vars(self.passes).values(), self.passed] if self.passes else []
-        return found if self.of_top is None else [*found, self.of_top]
+        if self.passes:
+            found += [*(getattr(self.passes, name) for name in self.declaration.parts), self.passed]
+        found += [] if self.of_top is None else [self.of_top]
+        return [*found, *self.wide_reflected, *self.wide_passed]

@@ -190,7 +190,7 @@ class Folded:
         middle entries change sign in mirrors; now they are of that of the material, where they hardly vary."""
 
         def each(values: Any) -> Any:
-            if values is None:
+            if values is None or isinstance(values, float):
                 return None
             if isinstance(values, (list, tuple)):
                 return type(values)(each(x) for x in values)

@@ -13,6 +13,10 @@ from velatura import ops
 TARGET_SAMPLE_WEIGHT = 2.7  # weight of samples of a part, where they can be kept so light
 KEPT = 0.7  # of the share by its energy that a part keeps at least
 STEPS = 8  # of halving
+EVENED = 16  # steps by which they are shared anew
+HEAVY = 6  # power of the weights of samples, in their mean
+PLACES = 11  # between the chances that were and those
+BEYOND = 10.0  # variance that is as bad as a weight beyond the target
 NEGLIGIBLE = 2e-3  # share of the energy, of parts whose samples may be cut
 
 Array = NDArray[np.floating]
@@ -68,3 +72,31 @@ def shared(demand: Demand) -> Array:
         shares = np.where(raised, found, ops.divide(energy * left, total))
         raised |= shares < found
     return shares
+
+
+def evened(values: Array, kept: Array, densities: Array, chances: Array) -> Array:
+    """Chances (K, N) of parts with densities (K, N, P), of the same sum, shared anew so that the variance of weights is
+    the least without any above `TARGET_SAMPLE_WEIGHT`, as far as that can be: for values (N, P) at directions that are
+    even in projection, and the density `kept` (N, P) of all other parts.
+
+    Steps that scale chances by what more samples of a part would do to a high mean of weights find the chances by which
+    the heaviest are least. From there to those that were, the best place is taken.
+    """
+
+    def weights(found: Array) -> tuple[Array, Array]:
+        whole = kept + (found[..., None] * densities).sum(axis=0)
+        return ops.divide(values, whole), whole
+
+    found, total = chances, chances.sum(axis=0)
+    for _ in range(EVENED):
+        weight, whole = weights(found)
+        found = found * (weight**HEAVY * ops.divide(densities, whole)).mean(axis=-1) ** (1 / HEAVY)
+        found = found * ops.divide(total, found.sum(axis=0))
+    places = [chances + share * (found - chances) for share in np.linspace(0, 1, PLACES)]
+    costs = []
+    for place in places:
+        weight, _ = weights(place)
+        beyond = np.maximum(weight.max(axis=-1) - TARGET_SAMPLE_WEIGHT, 0)
+        costs.append((values * weight).mean(axis=-1) + BEYOND * beyond)
+    best = np.argmin(costs, axis=0)
+    return np.asarray(np.take_along_axis(np.array(places), best[None, None], axis=0)[0])

@@ -17,8 +17,8 @@ from velatura.media import of_material
 from velatura.model.base import Model
 from velatura.model.context import Context, channels
 from velatura.model.smooth_interface import SmoothInterface, smooth_interfaces
-from velatura.model.solved import reciprocal_balance, sample_allocation
-from velatura.model.solved.bsdf import ROOTS, Shape, Side, Solved
+from velatura.model.solved import reciprocal_balance, sample_allocation, wide_light
+from velatura.model.solved.bsdf import ROOTS, Shape, Side, SideView, Solved
 from velatura.model.solved.columns import Columns, Declaration
 from velatura.model.solved.energies.adding import Part, interfaces, parts
 from velatura.model.solved.energies.energies import INCIDENCES, MODES, SAMPLES, Energies, energies, media_of
@@ -27,7 +27,7 @@ from velatura.model.solved.energies.modes import Relative
 from velatura.model.solved.energies.nodes import Nodes
 from velatura.model.solved.grid import Folded, Grid, Listed
 from velatura.model.solved.guards import ALBEDO_MIN, COS_ON_GRID_MIN, ENERGY_EPS, WIDTH_ALPHA_MAX
-from velatura.model.solved.lobes import refracted_lobe, remainder, top_medium, widths
+from velatura.model.solved.lobes import refracted_lobe, remainder, top_medium, wide, widths
 from velatura.model.solved.lobes.refracted_lobe import MediumIndex
 from velatura.model.solved.lobes.remainder import EVEN, Remainder, RemainderSamples
 from velatura.model.solved.lobes.top_medium import ORDERS, Medium, PassedMedium, ScatteredThrough, TopMedium, TopSamples
@@ -126,7 +126,9 @@ class SolvedSide:
         anew where nothing passes."""
         columns = self.columns
         weights = [factor * weight for factor, weight in zip(factors, columns.weights)]
-        columns = replace(columns, weights=weights, scale=factors[len(weights)] * columns.scale)
+        rest = factors[len(weights)]
+        beyond = [*(rest * energy for energy in columns.wide_reflected[:1]), *columns.wide_reflected[1:]]
+        columns = replace(columns, weights=weights, scale=rest * columns.scale, wide_reflected=beyond)
         if columns.passes:
             columns = replace(columns, passes=replace(columns.passes, straight=factors[-1]))
         else:
@@ -145,6 +147,10 @@ class Lit:
 
     def body(self, which: NDArray[np.integer]) -> Solved:
         """The side as a BSDF for light from the directions of numbers `which` alone."""
+        return Solved(self.side, None, 1.0, False, (self.view(which)[0], 1.0))
+
+    def view(self, which: NDArray[np.integer]) -> tuple[SideView, Direction]:
+        """What light from the directions of numbers `which` sees, and these."""
 
         def taken(value: Any) -> Any:
             if isinstance(value, (list, tuple)):
@@ -155,7 +161,7 @@ class Lit:
 
         columns = Columns(*map(taken, vars(self.columns).values()))
         x, y, z = map(taken, self.wi)
-        return Solved(self.side, None, 1.0, False, (self.side.given((x, y, z), columns), 1.0))
+        return self.side.given((x, y, z), columns), (x, y, z)
 
 
 class _Lobe(NamedTuple):
@@ -166,9 +172,9 @@ class _Lobe(NamedTuple):
 
 
 @dataclass(frozen=True)
-class _Wide:
-    """Light over all directions: a polynomial of numbers (C, 1), and beside it what a medium scatters, with the share
-    of samples that it has at cosines (K,); None without one."""
+class _Diffuse:
+    """Diffuse light, over all directions: a polynomial of numbers (C, 1), and beside it what a medium scatters, with
+    the share of samples that it has at cosines (K,); None without one."""
 
     polynomial: Remainder
     medium: TopMedium | None = None
@@ -184,7 +190,7 @@ class _Wide:
         medium: TopMedium | None = None,
         scattered: Sequence[Array] = (),
         cosines: Any = None,
-    ) -> _Wide:
+    ) -> _Diffuse:
         """Fit to light (C, modes, N, I) from cosines `incidences`, of a material of these albedos (C, I). What the
         medium has `scattered` once is known, and so is light of its wider phase functions, whose shares are fitted."""
         own, *others = scattered or (0.0,)
@@ -217,7 +223,8 @@ class Solver:
 
     `shape` is that of the grid on which a renderer has the columns. `samples` are those of `reciprocal_balance`;
     `normals` are those of facets, and of lobes that are integrated, None for as many as usual, or as are asked for by
-    `finely`. A medium on top scatters by `phase_of` its values.
+    `finely`. A medium on top scatters by `phase_of` its values. Light that is too `wide` for lobes has a shape of its
+    own, where materials have values of their own, none of a table.
     """
 
     model: Model
@@ -230,6 +237,7 @@ class Solver:
     normals: int | None = None
     finely: bool = False
     phase_of: Callable[[SlabValues], PhaseFunction] = of_material.phase_of
+    wide: bool = False
 
     @classmethod
     def of(cls, model: Model, variance: type[Variance], context: Context, material: Material | None = None) -> Solver:
@@ -282,7 +290,6 @@ class Solver:
         found *= len(each) // len(found)
         if self.model.form == "forward":
             return found
-        found = [replace(each, columns=replace(each.columns, scale=0 * each.columns.scale + 1)) for each in found]
         numbers, folded = self.body(material, found, layouts), Folded.of(self.grid.coarser(material), material)
         factors, wanted = reciprocal_balance.factors(
             numbers, folded.directions, folded.shares, folded.count, self.samples, _share(len(material.interfaces))
@@ -301,12 +308,12 @@ class Solver:
         made: list[Side] = []
         for seen, side, layout in zip(sides(material), found, layouts):
             curves = directional_grid.curves(list(self.spread(side)), self.shape, None)
-            made.append(self._in_numpy(seen, side, layout, curves))
+            made.append(self._in_numpy(seen, side.numbers, layout, curves))
         return self.bsdf(material, made)
 
-    def _in_numpy(self, material: Material, found: SolvedSide, layout: Layout, curves: Any) -> Side:
-        numbers = [*found.numbers.reshape(-1, self.colours, 1)]
-        return self.side(material, layout, curves, numbers, Context(colour=_stacked, tables=self.tables))
+    def _in_numpy(self, material: Material, numbers: Array, layout: Layout, curves: Any) -> Side:
+        each = [*numbers.reshape(-1, self.colours, 1)]
+        return self.side(material, layout, curves, each, Context(colour=_stacked, tables=self.tables))
 
     def side(self, material: Material, layout: Layout, curves: Any, numbers: Sequence[Value], context: Context) -> Side:
         """A side of a material of a renderer's values, those of one point or of all; `numbers` are colours in the order
@@ -321,8 +328,13 @@ class Solver:
             passed = _polynomial(each)
             through = ScatteredThrough(passed, self.medium(PassedMedium, material, layout, _shares(each)))
             transmission = replace(transmission, through=through)
-        samples = polynomial.samples
-        return Side(curves, shapes, polynomial, samples, transmission, context.colour, self.colours, self.kind, top)
+        samples, colour, kind = polynomial.samples, context.colour, self.kind
+        return Side(curves, shapes, polynomial, samples, transmission, colour, self.colours, kind, top, self.wide)
+
+    def own(self, material: Material, layouts: Sequence[Layout]) -> Solver:
+        """The solver for a material of NumPy's values of its own."""
+        apart = any(layout.apart for layout in layouts)
+        return replace(self, wide=not apart and wide.share(material) > 0)
 
     def medium(self, kind: type[Medium], material: Material, layout: Layout, shares: Sequence[Value]) -> Medium:
         """The medium on top of a material in any dialect, with shares of its wider phase functions."""
@@ -348,15 +360,16 @@ class Solver:
     def lit(self, material: Material, wi: Direction) -> Lit:
         """The upper side of a material of NumPy's values, solved for light from directions wi, (M,) each, alone."""
         (layout, *_), upper = self.layouts([material]), sides(material)[0]
-        found = self._side(upper, layout, Listed(self.isotropic, wi))
-        return Lit(self._in_numpy(upper, found, layout, None), found.columns, wi)
+        solver = self.own(material, [layout])
+        found = solver._side(upper, layout, Listed(self.isotropic, wi))
+        return Lit(solver._in_numpy(upper, found.numbers, layout, None), found.columns, wi)
 
     def _side(self, material: Material, layout: Layout, folded: Folded | Listed) -> SolvedSide:
         """A side of a material at some directions, in the order of the physics."""
-        light, wide, through = self._light(material, layout, folded)
+        light, diffuse, through = self._light(material, layout, folded)
         lobes = self._lobes(material, layout, folded, light)
-        clipped, peak = _clipped(wide, folded.at_cosines)
-        whole = wide.polynomial.albedo(folded.cosine) + folded.around(clipped)
+        clipped, peak = _clipped(diffuse, folded.at_cosines)
+        whole = diffuse.polynomial.albedo(folded.cosine) + folded.around(clipped)
         drawn, rest = self._hand_over(_in_veils(layout, material, light), folded, lobes, light.rest, whole)
         scale = _scale(rest, whole)
         wanted = [*(each.wanted for each in drawn), Demand.of(rest + ENERGY_EPS, rest, scale * folded.around(peak))]
@@ -367,52 +380,63 @@ class Solver:
             [tuple(np.broadcast_to(x, folded.count) for x in self._roughness(lobe.tensor)) for lobe in lobes],
             list(shares[:-1]),
             [self._colours(each.energy) for each in drawn],
-            self._colours(scale),
+            self._colours(scale if self.model.form == "forward" else 0 * scale + 1),
             shares[-1],
             self._colours(rest),
             passes,
             self._colours(light.passed) if passes else None,
-            None if wide.chance is None else folded.around(wide.chance),
+            None if diffuse.chance is None else folded.around(diffuse.chance),
         )
-        count, numbers = len(fields(Remainder)), [number for each in (wide, through) if each for number in each.numbers]
-        numbers = [self._colours(each)[:, 0] for each in numbers]
+        found = [number for each in (diffuse, through) if each for number in each.numbers]
+        numbers = np.array([self._colours(number)[:, 0] for number in found])
+        if self.wide and transmission:
+            inner = [lobe.interface > 0 for lobe in layout.lobes]
+            columns, shares = wide_light.columns(columns, wide.share(material), inner, light, transmission, folded)
+            lit = Lit(self._in_numpy(material, numbers, layout, None), columns, folded.directions)
+            columns = wide_light.shared(columns, shares, lit.view, folded)
         edged = self._edged(material, lobes, folded.phi)
         forward = transmission if self.model.form == "forward" else None
-        polynomial, clipped = Remainder(*numbers[:count]), self._colours(clipped)
-        return SolvedSide(folded.unfolded(columns), polynomial, clipped, edged, forward, numbers[count:])
+        count, clipped = len(fields(Remainder)), self._colours(clipped)
+        polynomial, top = Remainder(*numbers[:count]), [*numbers[count:]]
+        return SolvedSide(folded.unfolded(columns), polynomial, clipped, edged, forward, top)
 
     def _light(
         self, material: Material, layout: Layout, folded: Folded | Listed
-    ) -> tuple[Energies, _Wide, _Wide | None]:
+    ) -> tuple[Energies, _Diffuse, _Diffuse | None]:
         """Solve for the energies of all parts, and fit the remainder beside what a medium on top scatters back, and
         what passes it where it is alone."""
         incidences = _incidences(layout)
+        also = wide_light.cosines(folded) if self.wide else incidences[:0]
         solved = energies(
             material,
             np.concatenate([folded.cosine, incidences]),
             np.concatenate([folded.phi, 0 * incidences]),
             self.tables if self.model.microsurface else None,
             widths.nearly_straight,
-            incidences,
+            np.concatenate([incidences, also]),
             samples=self.normals or (FINELY[0] if self.finely else SAMPLES),
             like=layout.indices,
             events=layout.top is not None,
+            modes=len(wide.TERMS) if self.wide else MODES,
         )
+        by_node = "remainder", "around", "again"
+        few = {name: getattr(solved, name)[:, :MODES, :, : len(incidences)] for name in by_node}
+        solved = replace(solved, **few)
         albedos = (solved.lobes.sum(axis=0) + solved.veils.sum(axis=0) + solved.rest)[:, folded.count :]
         seen, cosines = (solved.nodes, incidences), folded.at_cosines[2]
         first, reflected = solved.first(folded.count), (solved.remainder, albedos)
         if not layout.apart:
-            return first, _Wide.fitted(*seen, *reflected), None
+            return first, _Diffuse.fitted(*seen, *reflected), None
         grey, nothing = _uncoloured(material), [np.zeros((1, 1))] * len(ORDERS)
         top = self.medium(TopMedium, grey, layout, nothing)
         if layout.top is None:
-            return first, replace(_Wide.fitted(*seen, *reflected), medium=top, chance=0 * cosines), None
+            return first, replace(_Diffuse.fitted(*seen, *reflected), medium=top, chance=0 * cosines), None
         back, through = _scattered(top, solved.nodes, layout.alone)
-        wide = _Wide.fitted(*seen, *reflected, top, back, cosines)
+        diffuse = _Diffuse.fitted(*seen, *reflected, top, back, cosines)
         if not layout.alone:
-            return first, wide, None
+            return first, diffuse, None
         passed, medium = (solved.around, _energy(solved.around)), self.medium(PassedMedium, grey, layout, nothing)
-        return first, wide, _Wide.fitted(*seen, *passed, medium, through, cosines)
+        return first, diffuse, _Diffuse.fitted(*seen, *passed, medium, through, cosines)
 
     def _lobes(self, material: Material, layout: Layout, folded: Folded | Listed, light: Energies) -> list[_Lobe]:
         """Work out the widths of lobes and veils."""
@@ -452,7 +476,7 @@ class Solver:
         light: Energies,
         wanted: Sequence[Demand],
         transmission: Transmission | None,
-        through: _Wide | None,
+        through: _Diffuse | None,
     ) -> tuple[Array, Parts | None]:
         """Share samples among what is reflected, and what passes, which gets its weights."""
         # Light of a single isotropic interface is the same there and back
@@ -515,7 +539,10 @@ class Solver:
             whole = np.repeat(whole, math.prod(self.shape[1:]), axis=-1)
             firsts = (declared.first_rows(name, self.colours)[0] for name in ("scale", "rest"))
             scale, rest = (slice(k, k + self.colours) for k in firsts)
-            rows[scale] = _scale(rows[rest], whole)
+            light = rows[rest]
+            for row in declared.first_rows("wide_reflected_energy", self.colours):
+                light = light - rows[row : row + self.colours]
+            rows[scale] = _scale(light, whole)
         return rows
 
     def _pass_between(self, rows: Array, transmission: Transmission, energy: int, weights: Sequence[int]) -> None:
@@ -529,9 +556,9 @@ class Solver:
         if not len(there):
             return
         x, y, z = (w[there] for w in wi)
-        straight, bounces, light = (rows[k : k + self.colours, there] for k in (*weights[:2], energy))
-        left = light - combined.energy(transmission, (x, y, z), straight, bounces)
-        rest = slice(weights[-1], weights[-1] + self.colours)
+        light, straight, bounces, _, *others = (rows[k : k + self.colours, there] for k in (energy, *weights))
+        left = light - combined.energy(transmission, (x, y, z), straight, bounces) - sum(others)
+        rest = slice(weights[2], weights[2] + self.colours)
         rows[rest, there] = combined.rest(transmission, (x, y, z), left)
 
     def _scale_energies(self, rows: Array, proportions: Sequence[tuple[int, Sequence[int]]], whole: Array) -> None:
@@ -592,6 +619,7 @@ def solve(material: Material, model: Model, variance: type[Variance], context: C
     start, given = plain(material), Variables.of(material)
     solver = Solver.of(model, variance, context, start)
     layouts = solver.layouts([start])
+    solver = solver.own(start, layouts)
 
     packings: list[Packing] = []
 
@@ -626,7 +654,7 @@ def coloured(numbers: Sequence[Value], solver: Solver, context: Context) -> list
 
 
 def _incidences(layout: Layout) -> Array:
-    """Cosines at which wide light is known: that of a medium on top has a shape at slants, too."""
+    """Cosines at which diffuse light is known: that of a medium on top has a shape at slants, too."""
     return INCIDENCES if layout.top is None else SLANTED
 
 
@@ -731,10 +759,10 @@ def _uncoloured(material: Material) -> Material:
     return material.each(lambda _, value: channels(value) if np.ndim(value) else value)
 
 
-def _clipped(wide: _Wide, wi: Direction) -> tuple[Array, Array]:
+def _clipped(diffuse: _Diffuse, wi: Direction) -> tuple[Array, Array]:
     """Albedo that a polynomial gains by a medium beside it, and by being clipped, and the largest weight of samples,
     (C, M)."""
-    numbers, top = direct.wider(wide.polynomial), direct.wider(wide.medium)
+    numbers, top = direct.wider(diffuse.polynomial), direct.wider(diffuse.medium)
     x, y, z = (each[:, None] for each in wi)
     # Not where it is sampled: directions of samples jump with the numbers
     cosine, turn = low_discrepancy.fibonacci(EVENLY)
@@ -743,7 +771,7 @@ def _clipped(wide: _Wide, wi: Direction) -> tuple[Array, Array]:
     samples: RemainderSamples | TopSamples = numbers.samples
     value, density = numbers.value, np.full(EVENLY, 1 / (2 * np.pi))
     if top:
-        samples = TopSamples(numbers.samples, top, wide.chance[:, None])
+        samples = TopSamples(numbers.samples, top, diffuse.chance[:, None])
         value, (wo, density) = partial(top_medium.value, numbers, top), top.lattice((x, y, z), wo, cosine, turn)
     light = value((x, y, z), wo)
     gained = (light - numbers.unclipped((x, y, z), wo)[1] * (wo[2] / np.pi)) / density

@@ -105,7 +105,8 @@ class SolvedLookUp(LookUp):
             found |= {f"reflected[{k}].{part}": value for part, value in parts.items()}
         found |= {"remainder": columns.scale, "remainder_chance": columns.chance}
         if columns.passes:
-            found |= {f"passed_{name}": value for name, value in vars(columns.passes).items()}
+            passed = vars(columns.passes).items()
+            found |= {f"passed_{name}": value for name, value in passed if name not in Parts.OF_WIDE}
         if general and columns.passes and seen.transmission:
             passes = ops.mean(direct.entered(seen.transmission, seen.turned(wi, wi)).passes[0])
             straight = columns.passes.of_straight

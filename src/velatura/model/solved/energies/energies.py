@@ -61,6 +61,8 @@ class Energies:
             the `nodes`, (C, MODES, N, I).
         around: likewise what passes not straight through, and `again` of that what facets that are met once reflect
             inside, without scattering media.
+        beyond, passing: likewise, by as many modes as are asked for, what is reflected outside the lobe of the first
+            interface, and all that passes.
     """
 
     lobes: Array
@@ -72,6 +74,8 @@ class Energies:
     remainder: Array
     around: Array
     again: Array
+    beyond: Array
+    passing: Array
     nodes: Nodes
 
     def first(self, count: int) -> Energies:
@@ -90,13 +94,15 @@ def energies(
     samples: int = SAMPLES,
     like: Sequence[float] | None = None,
     events: bool = False,
+    modes: int = MODES,
 ) -> Energies:
     """Energies for beams at cosines and azimuths (M,).
 
     `material` has NumPy's values. With the tables of multiple scattering facets are met often; `forward` is what goes
     into veils. The remainder is known at the cosines `incidences`, (I,); without
     any, lobes are all that is worked out, which is quicker. `samples` are normals for light from each node, and of each
-    beam; as many nodes are taken as for media of indices `like` those of the material; `events` as of `Setting`.
+    beam; as many nodes are taken as for media of indices `like` those of the material; `events` as of `Setting`; light
+    at the nodes has so many `modes`.
     """
     colours = Colours.of(material)
     everything = colours.at_wavelengths(_ended(parts(material)))
@@ -105,7 +111,7 @@ def energies(
     cosines = np.concatenate([cos_theta, np.tile(incidences, len(azimuths))])
     around = np.concatenate([np.broadcast_to(phi, np.shape(cos_theta)), np.repeat(azimuths, len(incidences))])
     nodes = Nodes.of(indices(everything), NODES, like)
-    orders = tuple(range(MODES if len(incidences) else 1))
+    orders = tuple(range(modes if len(incidences) else 1))
     basis: Basis = Even.of(nodes, brushed) if brushed else Relative(nodes, orders)
     setting = Setting(basis, np.sqrt(np.maximum(1 - cosines * cosines, 0)), around, samples, often, events)
 
@@ -142,13 +148,13 @@ def energies(
     lobes, veils, rest = colours.parts_seen(lobes, veils, rest)
     count = np.size(cos_theta)
     if brushed and len(incidences):
-        by_node = _of_isotropic(material, rest[:, count:], often, forward, incidences, samples, like, events)
+        by_node = _of_isotropic(material, rest[:, count:], often, forward, incidences, samples, like, events, modes)
     elif len(incidences):
         in_lobes = zip(places, taken[:, :, None, None])
         lights = _by_node(full, sharp, kept, whole, in_lobes)
         by_node = tuple(colours.seen(light[..., count:]) for light in lights)
     else:
-        by_node = (np.zeros((1, 1, nodes.count, 0)),) * 3
+        by_node = (np.zeros((1, 1, nodes.count, 0)),) * 5
     straight, through, passed = map(
         colours.seen, (sharp.energies.straight, sharp.energies.passed, full.energies.passed)
     )
@@ -162,6 +168,8 @@ def energies(
         remainder=by_node[0],
         around=by_node[1],
         again=by_node[2],
+        beyond=by_node[3],
+        passing=by_node[4],
         nodes=nodes,
     )
 
@@ -203,14 +211,18 @@ def _taken(share: Array, again: Array, once: Array) -> Array:
 
 def _by_node(
     full: Leaving, sharp: Leaving, kept: Leaving, whole: Leaving, in_lobes: Iterable[tuple[int, Array]]
-) -> tuple[Array, Array, Array]:
-    """Light at the nodes that no lobe has, that passes not straight, and that passes so without scattering media;
+) -> tuple[Array, ...]:
+    """Light at the nodes that no lobe has, that passes not straight, that passes so without scattering media, that is
+    not in the first lobe, and that passes;
     `in_lobes` says of each layer with a lobe what share of light that meets facets again the lobe takes."""
     of_full, of_sharp, of_kept, of_whole = (x.lights for x in (full, sharp, kept, whole))
-    remainder: Array = sum(of_full.reflected, np.zeros(()))
+    left: Array = sum(of_full.reflected, np.zeros(()))
+    beyond = None
     for i, taken in in_lobes:
-        remainder = remainder - of_kept.reflected[i] - taken * (of_whole.reflected[i] - of_sharp.reflected[i])
-    return remainder, of_full.passed - of_sharp.straight, of_sharp.passed - of_sharp.straight
+        left = left - of_kept.reflected[i] - taken * (of_whole.reflected[i] - of_sharp.reflected[i])
+        beyond = left if beyond is None else beyond
+    around, again = of_full.passed - of_sharp.straight, of_sharp.passed - of_sharp.straight
+    return left, around, again, left if beyond is None else beyond, of_full.passed
 
 
 def _of_isotropic(
@@ -230,7 +242,7 @@ def _of_isotropic(
     # Columns that cancel out are rounding
     size = np.abs(found.remainder).sum(axis=2).max(axis=1)
     scale = (mean / np.maximum(np.maximum(found.rest, CANCELS * size), TINY))[:, None, None]
-    return found.remainder * scale, found.around, found.again
+    return found.remainder * scale, found.around, found.again, found.beyond, found.passing
 
 
 def _isotropic(each: LayerValues) -> LayerValues:

@@ -170,7 +170,7 @@ class _Met:
 
     @classmethod
     def _of(cls, facets: Facets, p: Array, psi: Array, setting: Setting) -> _Met:
-        again = facets.across > 0 and setting.often is not None
+        again = max(facets.across, facets.onward) > 0 and setting.often is not None
         events = FirstEvents(facets, tuple(setting.ways), again)
         lights, others = setting.basis.deposited(
             events, p, psi, fibonacci(setting.samples), events.numbers(setting.samples), events.kind
@@ -185,10 +185,10 @@ class _Met:
         return cls(lights[0], None if facets.opaque or facets.final else lights[1], shares, tuple(second))
 
     def _of_some(self, sources: slice | NDArray[np.integer]) -> _Met:
-        """Some of the sources of isotropic facets, whose second events are not looked at."""
+        """Some of the sources of isotropic facets."""
         refracted = None if self.refracted is None else self.refracted[..., sources]
         shares = FirstShares(*(x[:, sources] for x in vars(self.shares).values()))
-        return _Met(self.reflected[..., sources], refracted, shares)
+        return _Met(self.reflected[..., sources], refracted, shares, tuple(x[..., sources] for x in self.second))
 
 
 @dataclass(frozen=True)
@@ -249,9 +249,9 @@ class _Side:
 def _again(taken: _Blocked, there: _Blocked, second: Sequence[Operator], facets: Facets, setting: Setting) -> Operator:
     """Light that is blocked at first, and leaves in the directions in which light is blocked `there`: the less facets
     turn it, the more of it goes on as it came. Brushed ones, which keep its momentum along them, send what they reflect
-    where their `second` events do, and a share of what passes."""
-    brushed = facets.across * (1.0 if there is taken else fitted.PASSED_ON)
-    if brushed == 1:
+    where their `second` events do, and a share of what passes; rough ones a share of what passes."""
+    exact = facets.across if there is taken else max(fitted.PASSED_ON * facets.across, facets.onward)
+    if exact == 1:
         return second[0]
     turn = 0.5 * (facets.alpha_u + facets.alpha_v) * (fitted.OPAQUE_STEP if facets.opaque else facets.step)
     swing = fitted.SWING * float(np.exp(-fitted.SWING * turn))  # model.md, Eq. 4
@@ -262,7 +262,7 @@ def _again(taken: _Blocked, there: _Blocked, second: Sequence[Operator], facets:
         )
     )
     even = Operator.of(nodes, beams)
-    return brushed * second[0] + (1 - brushed) * even if brushed else even
+    return exact * second[0] + (1 - exact) * even if exact else even
 
 
 def _again_shares(facets: Facets, setting: Setting, p: Array, events: FirstShares) -> tuple[Array, Array]:

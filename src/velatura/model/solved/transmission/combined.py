@@ -11,7 +11,8 @@ be sampled of a single interface whose facets are met once; elsewhere reflected 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from math import pi
 from typing import ClassVar
 
 import numpy as np
@@ -21,7 +22,7 @@ from velatura import ops
 from velatura.model.directions import select_direction
 from velatura.model.solved import sample_allocation
 from velatura.model.solved.guards import BELOW_ONE
-from velatura.model.solved.lobes import refracted_lobe
+from velatura.model.solved.lobes import refracted_lobe, wide
 from velatura.model.solved.lobes.remainder import EVEN
 from velatura.model.solved.sample_allocation import Demand
 from velatura.model.solved.transmission import direct, internal_reflections
@@ -41,10 +42,12 @@ Array = NDArray[np.floating]
 @dataclass(frozen=True)
 class Parts(ops.NamedFields):
     """Light from one direction that passes: weights (colours) of what goes straight through, of what bounces, and of
-    what is scattered, and the probabilities of sampling them; reflected lobes are sampled else."""
+    what is scattered, and the probabilities of sampling them; reflected lobes are sampled else. What is scattered has
+    numbers of its own. Where light is wide, what is scattered is drawn `forward`, and lobes keep the share `narrow`."""
 
     COLOURS: ClassVar = ("straight", "bounced", "rest")
     CHANCES: ClassVar = ("of_straight", "of_bounced", "of_rest")
+    OF_WIDE: ClassVar = ("forward", "narrow")
 
     straight: Value
     bounced: Value
@@ -57,11 +60,17 @@ class Parts(ops.NamedFields):
     grazing: Value = EVEN[2]
     once: Value = EVEN[3]
     twice: Value = EVEN[4]
+    forward: Value = 0.0
+    narrow: Value = 1.0
 
     @property
     def numbers(self) -> list[Value]:
         """Those of diffuse light."""
         return [self.even, self.cosine, self.grazing, self.once, self.twice]
+
+    def kept(self, share: Value) -> Parts:
+        """The parts with a share of their light."""
+        return replace(self, narrow=share, **{name: share * getattr(self, name) for name in self.COLOURS})
 
     @property
     def share(self) -> Value:
@@ -162,7 +171,9 @@ def eval_pdf(transmission: Transmission, of: Parts, wi: Direction, wo: Direction
         (
             of.rest,
             of.of_rest,
-            internal_reflections.eval_pdf_rest(internal_reflections.rest(transmission, wi, of.numbers), i, o),
+            internal_reflections.eval_pdf_rest(
+                internal_reflections.rest(transmission, wi, of.numbers, of.forward), i, o
+            ),
         )
     ]
     if lobe:
@@ -172,6 +183,17 @@ def eval_pdf(transmission: Transmission, of: Parts, wi: Direction, wo: Direction
         value = value + ops.select(passes, weight * more, 0.0)
         density = density + ops.select(passes, probability * density_of_more, 0.0)
     return value, density
+
+
+def wide_value(
+    transmission: Transmission, energy: Value, numbers: Sequence[Value], wi: Direction, wo: Direction
+) -> Value:
+    """f(wi, wo) |cos theta_o|, a colour, of an energy that passes in the shape of the numbers of `wide`."""
+    bound = internal_reflections.bound(transmission) / transmission.indices[-1]
+    i = internal_reflections.seen_below(transmission, wi)
+    within = internal_reflections.within((wo[0], wo[1], -wo[2]), bound)
+    even = ops.select((wi[2] > 0) & (within[2] > 0), ops.maximum(-wo[2], 0.0), 0.0)
+    return energy * (wide.density(numbers, i, within) * (even * (1 / pi)) / (bound * bound))
 
 
 def sample(transmission: Transmission, of: Parts, wi: Direction, u: Value, u1: Value, u2: Value) -> Direction:
@@ -186,7 +208,9 @@ def sample(transmission: Transmission, of: Parts, wi: Direction, u: Value, u1: V
         wo = select_direction(u < probability, wo, _down(refracted_lobe.sample(lobe, i, u1, u2)))
     again = ops.clip(ops.divide(u - begin, 1 - begin), 0.0, BELOW_ONE)
     scattered = _down(
-        internal_reflections.sample_rest(internal_reflections.rest(transmission, wi, of.numbers), i, again, u1, u2)
+        internal_reflections.sample_rest(
+            internal_reflections.rest(transmission, wi, of.numbers, of.forward), i, again, u1, u2
+        )
     )
     return select_direction(u < begin, wo, scattered)
 

@@ -33,6 +33,7 @@ from velatura.model.solved.lobes import refracted_lobe, remainder
 from velatura.model.solved.lobes.refracted_lobe import RefractedLobe
 from velatura.model.solved.lobes.remainder import EVEN, RemainderSamples
 from velatura.model.solved.lobes.top_medium import PassedSamples
+from velatura.model.solved.transmission import forward
 from velatura.model.solved.transmission.direct import (
     WIDTHS,
     CrossedSlab,
@@ -54,23 +55,20 @@ Array = NDArray[np.floating]
 @dataclass(frozen=True)
 class Rest:
     """Light that is scattered: a lobe, None without one, with a diffuse share of `diffuse` over momenta up to `bound`,
-    relative to the index below, by the `numbers` of `remainder.passing`."""
+    relative to the index below, by the `numbers` of `remainder.passing`. Its samples crowd about a share `forward` of
+    the momentum of the light."""
 
     lobe: RefractedLobe | None
     diffuse: Value
     bound: Value
     numbers: Sequence[Value]
+    forward: Value = 0.0
 
     @property
     def samples(self) -> RemainderSamples:
         """How diffuse light is sampled."""
         even, _, grazing, once, twice = self.numbers
         return RemainderSamples((even + grazing, 0.0, 0.0), (1.0, 0.0, 0.0), once, twice)
-
-    def within(self, o: Direction) -> Direction:
-        """A direction below as one of all that diffuse light has."""
-        x, y = o[0] / self.bound, o[1] / self.bound
-        return x, y, ops.sqrt(1 - x * x - y * y)
 
 
 def bounced(transmission: Transmission, wi: Direction) -> RefractedLobe | None:
@@ -112,22 +110,22 @@ class EitherRest:
 AnyRest: TypeAlias = Rest | PassedSamples | EitherRest
 
 
-def rest(transmission: Transmission, wi: Direction, numbers: Sequence[Value] = EVEN) -> AnyRest:
+def rest(transmission: Transmission, wi: Direction, numbers: Sequence[Value] = EVEN, crowded: Value = 0.0) -> AnyRest:
     """The light from wi, above, that is scattered by media, or often by facets; diffuse light has `numbers`, whose
-    first is of a medium alone the share of samples by phase functions."""
+    first is of a medium alone the share of samples by phase functions, and is drawn `crowded` otherwise."""
     through = transmission.through
     if through is None:
-        return _rest(transmission, wi, numbers)
+        return _rest(transmission, wi, numbers, crowded)
     alone = PassedSamples.of(through, numbers[0])
     if isinstance(through.is_alone, float):
         return alone
-    return EitherRest(through.is_alone > 0, alone, _rest(transmission, wi, numbers))
+    return EitherRest(through.is_alone > 0, alone, _rest(transmission, wi, numbers, crowded))
 
 
-def _rest(transmission: Transmission, wi: Direction, numbers: Sequence[Value]) -> Rest:
+def _rest(transmission: Transmission, wi: Direction, numbers: Sequence[Value], crowded: Value) -> Rest:
     reached = bound(transmission) / transmission.indices[-1]
     if not transmission.is_cloudy:
-        return Rest(None, 1.0, reached, numbers)
+        return Rest(None, 1.0, reached, numbers, crowded)
     i = entered(transmission, wi)
     scattering = [(slab, cosine) for slab, cosine in zip(transmission.slabs, i.bounded) if not is_none(slab.scattering)]
     alpha = _turned(scattering)
@@ -136,7 +134,7 @@ def _rest(transmission: Transmission, wi: Direction, numbers: Sequence[Value]) -
         (alpha - fitted.DIFFUSE_ALPHA[0]) / (fitted.DIFFUSE_ALPHA[1] - fitted.DIFFUSE_ALPHA[0]), 0.0, 1.0
     )
     width = type(transmission.refractions[0].width).uniform(WIDTHS.variance(alpha))
-    return Rest(_lobe(transmission, i, transmission.scattered, width), diffuse, reached, numbers)
+    return Rest(_lobe(transmission, i, transmission.scattered, width), diffuse, reached, numbers, crowded)
 
 
 def _turned(slabs: Sequence[tuple[CrossedSlab, Value]]) -> Value:
@@ -210,6 +208,12 @@ def seen_below(transmission: Transmission, wi: Direction) -> Direction:
     return x, y, ops.maximum(ops.sqrt(1 - x * x - y * y), COS_INSIDE_MIN)
 
 
+def within(o: Direction, bound: Value) -> Direction:
+    """A direction below as one of all that diffuse light up to a momentum has."""
+    x, y = o[0] / bound, o[1] / bound
+    return x, y, ops.sqrt(1 - x * x - y * y)
+
+
 def eval_pdf_rest(found: AnyRest, i: Direction, o: Direction) -> tuple[Value, Value]:
     """f |cos theta_o|, a colour, and the density of `sample_rest`, in the frame of `seen_below`."""
     if isinstance(found, PassedSamples):
@@ -217,10 +221,11 @@ def eval_pdf_rest(found: AnyRest, i: Direction, o: Direction) -> tuple[Value, Va
     if isinstance(found, EitherRest):
         (value, density), (other, of_other) = (eval_pdf_rest(each, i, o) for each in (found.alone, found.other))
         return ops.select(found.where, value, other), ops.select(found.where, density, of_other)
-    within = found.within(o)
+    inside = within(o, found.bound)
     even = found.diffuse * ops.maximum(o[2], 0.0) / (found.bound * found.bound)
-    value = ops.select(within[2] > 0, even * (1 / pi) * diffuse(found.numbers, i, within), 0.0)
-    density = even / ops.maximum(within[2], COS_OUTSIDE_MIN) * found.samples.density(i, within)
+    value = ops.select(inside[2] > 0, even * (1 / pi) * diffuse(found.numbers, i, inside), 0.0)
+    drawn, crowd = forward.undone(found.forward, i, inside)
+    density = even * crowd / ops.maximum(drawn[2], COS_OUTSIDE_MIN) * found.samples.density(i, drawn)
     if found.lobe:
         also, density_of_lobe = refracted_lobe.eval_pdf(found.lobe, i, o)
         value, density = (1 - found.diffuse) * also + value, (1 - found.diffuse) * density_of_lobe + density
@@ -235,7 +240,8 @@ def sample_rest(found: AnyRest, i: Direction, u: Value, u1: Value, u2: Value) ->
         w, other = (sample_rest(each, i, u, u1, u2) for each in (found.alone, found.other))
         return select_direction(found.where, w, other)
     even = found.samples.sample(i, ops.clip(ops.divide(u, found.diffuse), 0.0, 1.0), u1, u2)
-    x, y = found.bound * even[0], found.bound * even[1]
+    x, y, _ = forward.moved(found.forward, i, even)
+    x, y = found.bound * x, found.bound * y
     even = x, y, ops.sqrt(1 - x * x - y * y)
     if not found.lobe:
         return even

@@ -1,0 +1,127 @@
+"""Light of a solved side that is too wide for lobes: what lobes leave to waves of the azimuth, and how it is drawn.
+
+In every direction waves take as much of the light as they have the shape of (`velatura.model.solved.lobes.wide`). The
+first interface, which reflects as one facet does, keeps its lobe. Samples are those of all lobes still, and of what is
+diffuse, shared anew.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from velatura import ops
+from velatura.model.solved import sample_allocation
+from velatura.model.solved.bsdf import SideView
+from velatura.model.solved.columns import Columns
+from velatura.model.solved.energies.energies import INCIDENCES, Energies
+from velatura.model.solved.grid import Folded, Listed
+from velatura.model.solved.lobes import wide
+from velatura.model.solved.transmission import forward, internal_reflections
+from velatura.model.solved.transmission.combined import Parts
+from velatura.model.solved.transmission.direct import Transmission
+from velatura.optics.ggx import Direction
+from velatura.renderer import low_discrepancy
+
+Array = NDArray[np.floating]
+View = Callable[[NDArray[np.integer]], tuple[SideView, Direction]]
+
+EVENLY = 144  # directions of each side at which samples are looked at
+STEEP = 0.1  # sine of light below which samples crowd less
+FORWARD = np.linspace(0, 0.8, 17)  # shares of the momentum of light, about which samples crowd
+
+
+def cosines(folded: Folded | Listed) -> Array:
+    """Cosines of light at which its waves are known: first the one from which these are extended to the normal."""
+    return np.concatenate([[np.sqrt(1 - wide.STEEP**2)], folded.at_cosines[2]])
+
+
+def columns(
+    found: Columns,
+    share: float,
+    inner: Sequence[bool],
+    light: Energies,
+    transmission: Transmission,
+    folded: Folded | Listed,
+) -> tuple[Columns, Array]:
+    """Columns of a side of which waves have a share of the light at most, and what they have (M,), of what is reflected
+    or of what passes, whichever is more.
+
+    `inner` says of each lobe whether it is of another interface than the first. `light` is known at `cosines` after
+    `INCIDENCES`.
+    """
+    assert found.passes and found.passed is not None
+    beyond, passing = (np.mean(each, axis=0)[..., len(INCIDENCES) :] for each in (light.beyond, light.passing))
+    z = cosines(folded)
+    wi = np.sqrt(1 - z * z), 0 * z, z
+    bound = float(ops.mean(internal_reflections.bound(transmission)))
+    reflected, back = wide.fit(light.nodes, beyond, 1.0, wi[0])
+    passed, through = wide.fit(light.nodes, passing, bound, internal_reflections.seen_below(transmission, wi)[0])
+    back, through = (share * folded.around(each) for each in (back, through))
+    kept = [1 - back if each else 1.0 for each in inner]
+    handed = sum((energy for energy, each in zip(found.energies, inner) if each), 0 * found.rest)
+    crowded = folded.around(_forward(passed, internal_reflections.seen_below(transmission, folded.at_cosines)))
+    narrowed = replace(
+        found,
+        weights=[x * weight for x, weight in zip(kept, found.weights)],
+        energies=[x * energy for x, energy in zip(kept, found.energies)],
+        scale=(1 - back) * found.scale,
+        rest=found.rest + back * handed,
+        passes=replace(found.passes.kept(1 - through), forward=through * crowded),
+        wide_reflected=[back * (found.rest + handed), *folded.around(reflected)],
+        wide_passed=[through * found.passed, *folded.around(passed)],
+    )
+    return narrowed, np.maximum(back, through)
+
+
+def _forward(numbers: Array, i: Direction) -> Array:
+    """Shares (M,) of the momentum of light from directions i (M,), about which samples have the same mean momentum as
+    light that passes by numbers (COUNT, M)."""
+    x, y, z = _evenly()
+    length = np.hypot(i[0], i[1])
+    lit = wide.density([*numbers[..., None]], (length[:, None], 0 * x, i[2][:, None]), (x, y, z))
+    known = [forward.moved(float(share), (-1.0, 0.0, 0.0), (x, y, z))[0].mean() for share in FORWARD]
+    shares = np.interp((lit * -x).mean(axis=-1), known, FORWARD) / np.maximum(length, STEEP)
+    return np.minimum(shares, FORWARD[-1])
+
+
+def shared(found: Columns, shares: Array, view: View, folded: Folded | Listed) -> Columns:
+    """Columns with samples of what passes, and of the remainder, shared anew, as far as light is wide, by `shares`
+    (M,); what light from directions sees is in `view`."""
+    passes = found.passes
+    assert passes
+    # Azimuths hardly matter where light is wide
+    cosine = folded.around(np.arange(float(len(folded.at_cosines[2])))).astype(int)
+    first = np.unique(cosine, return_index=True)[1]
+    x, y, z = (np.tile(each, len(first)) for each in _evenly())
+    of, i = view(np.repeat(first, EVENLY))
+    assert of.columns.passes
+    alone = {name: row[:, None] for name, row in zip(Parts.CHANCES, np.eye(len(Parts.CHANCES)))}
+    each = replace(of, columns=replace(of.columns, passes=replace(of.columns.passes, **alone)))
+    parts = [of.part(k, i, (x, y, z)) for k in range(len(of.chances))]
+    mirrored, passed = (each.through(i, (x, y, sign * z)) for sign in (1, -1))
+    values = sum(value for value, _ in parts), passed[0]
+    kept = sum(chance * density for chance, (_, density) in zip(of.columns.chances, parts)), 0 * z
+    densities = [(parts[-1][1], 0 * z), *zip(mirrored[1], passed[1])]
+
+    def both(above: Array, below: Array) -> Array:
+        return np.concatenate([np.reshape(values, (len(first), -1)) for values in (above, below)], axis=-1)
+
+    wanted = both(*(np.reshape(value, (-1, len(z))).max(axis=0) for value in values))
+    before = np.array([found.chance, *(getattr(passes, name) for name in Parts.CHANCES)])
+    each_side = np.array([both(*density) for density in densities])
+    after = sample_allocation.evened(wanted, both(*kept), each_side, before[:, first])
+    after = before * ops.divide(after, before[:, first])[:, cosine]
+    after = after * ops.divide(before.sum(axis=0), after.sum(axis=0))
+    chance, *chances = before + shares * (after - before)
+    return replace(found, chance=chance, passes=replace(passes, **dict(zip(Parts.CHANCES, chances))))
+
+
+def _evenly() -> Direction:
+    """Directions above that are even in projection."""
+    radius2, turn = low_discrepancy.fibonacci(EVENLY)
+    radius = np.sqrt(radius2)
+    return radius * np.cos(2 * np.pi * turn), radius * np.sin(2 * np.pi * turn), np.sqrt(1 - radius2)
