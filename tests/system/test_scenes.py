@@ -176,7 +176,8 @@ def test_fourteen_coated_metals_share_their_kernels(mi: Any) -> None:
         with dr.scoped_set_flag(dr.JitFlag.KernelHistory):
             dr.kernel_history_clear()
             scenes.render(material, spp=1, size=(4, 4))
-            return {each["hash"] for each in dr.kernel_history([dr.KernelType.JIT])}
+            # A small one of single numbers of the scene comes once, now or then
+            return {each["hash"] for each in dr.kernel_history([dr.KernelType.JIT]) if each["size"] > 1}
 
     first = kernels(0.1, "Au")
     assert 0 < len(first) < 12
