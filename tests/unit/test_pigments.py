@@ -54,7 +54,7 @@ def sigma(stack: vt.Stack) -> tuple[Any, Any]:
 
 
 def test_coefficients_follow_from_k_and_s() -> None:
-    """K = 2 sigma_a and S = 3/4 (1 - g) sigma_s (Gate 1974), whatever the asymmetry is written by."""
+    """K = 2 sigma_a and S = 3/4 (1 - g) sigma_s (Gate 1974), for any way to write the asymmetry."""
     assert sigma(paint([WHITE])) == pytest.approx((0.005, 4 / 3 * 4))
     assert sigma(paint([WHITE], g=0.5)) == pytest.approx((0.005, 8 / 3 * 4))
     two_lobes = {"forward": 0.8, "backward": -0.2, "share": 0.7}

@@ -5,8 +5,8 @@ its values (`layer0_eta`, `layer0_alpha_u`, ...), each a number, a colour or spe
 material's own values.
 """
 
-from velatura.binding.bsdf import Asked, plugin_class
+from velatura.binding.bsdf import Asked, PointBSDF, plugin_class
 from velatura.binding.materials import STEERING_NM, Binding
 from velatura.binding.textures import Image
 
-__all__ = ["STEERING_NM", "Asked", "Binding", "Image", "plugin_class"]
+__all__ = ["STEERING_NM", "Asked", "Binding", "Image", "PointBSDF", "plugin_class"]

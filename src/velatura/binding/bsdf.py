@@ -61,9 +61,11 @@ class PointBSDF(Protocol):
         """A sample, with the number of its component in the stack, and its weight: None where that is the value over
         the density, which `eval_pdf` computes for the sample."""
 
-    def eval(self, wo: Any, active: Any) -> Any: ...
+    def eval(self, wo: Any, active: Any) -> Any:
+        return self.eval_pdf(wo, active)[0]
 
-    def pdf(self, wo: Any, active: Any) -> Any: ...
+    def pdf(self, wo: Any, active: Any) -> Any:
+        return self.eval_pdf(wo, active)[1]
 
     def eval_pdf(self, wo: Any, active: Any) -> tuple[Any, Any]: ...
 

@@ -10,7 +10,7 @@ from typing import Any, cast
 import numpy as np
 
 from velatura import kernel, tables
-from velatura.binding import Asked, Binding, Image, plugin_class
+from velatura.binding import Asked, Binding, Image, PointBSDF, plugin_class
 from velatura.errors import InvalidInput
 from velatura.model import DEFAULT, SWITCHES, Model, named, variance_kind
 from velatura.model.base import Body, Query
@@ -164,7 +164,7 @@ class LayeredStack:
 
 
 @dataclass(frozen=True)
-class LayeredPoint:
+class LayeredPoint(PointBSDF):
     """A stack at a surface point, for light from one direction."""
 
     stack: LayeredStack
@@ -195,12 +195,6 @@ class LayeredPoint:
                 sampled = dr.select(bs.sampled_component == number, mi.UInt32(+kind), sampled)
         bs.sampled_type = sampled
         return bs, weight
-
-    def eval(self, wo: Any, active: Any) -> Any:
-        return self.eval_pdf(wo, active)[0]
-
-    def pdf(self, wo: Any, active: Any) -> Any:
-        return self.eval_pdf(wo, active)[1]
 
     def eval_pdf(self, wo: Any, active: Any) -> tuple[Any, Any]:
         import drjit as dr

@@ -14,7 +14,7 @@ from math import pi
 from typing import Any
 
 from velatura import kernel, ops
-from velatura.binding import Asked, Binding, plugin_class
+from velatura.binding import Asked, Binding, PointBSDF, plugin_class
 from velatura.ops import Value
 from velatura.optics import fresnel, ggx, refraction
 from velatura.optics.ggx import Direction
@@ -81,7 +81,7 @@ class WeidlichWilkieStack:
 
 
 @dataclass(frozen=True)
-class WeidlichWilkiePoint:
+class WeidlichWilkiePoint(PointBSDF):
     """A stack at a surface point, for light from one direction, by the `asked` surfaces."""
 
     stack: WeidlichWilkieStack
@@ -99,12 +99,6 @@ class WeidlichWilkiePoint:
         last = bs.sampled_component == len(kinds) - 1
         bs.sampled_type = dr.select(last, mi.UInt32(+kinds[-1]), mi.UInt32(+kinds[0]))
         return bs, None
-
-    def eval(self, wo: Any, active: Any) -> Any:
-        return self.eval_pdf(wo, active)[0]
-
-    def pdf(self, wo: Any, active: Any) -> Any:
-        return self.eval_pdf(wo, active)[1]
 
     def eval_pdf(self, wo: Any, active: Any) -> tuple[Any, Any]:
         import drjit as dr

@@ -61,7 +61,7 @@ class Found(NamedTuple):
 
 
 class Varying(tuple[Value, ...]):
-    """Numbers that do not belong to the kind of a function, whatever they are."""
+    """Numbers none of which belongs to the kind of a function, 0.0 and 1.0 included."""
 
 
 #: Of sources, samples and numbers

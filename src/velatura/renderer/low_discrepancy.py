@@ -45,6 +45,15 @@ def fibonacci(count: int) -> tuple[np.ndarray, np.ndarray]:
 
 
 @functools.cache
+def even_in_projection(count: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Directions above, at least `count`, over which what leaves a surface is a mean; not to be written to."""
+    radius2, turn = fibonacci(count)
+    radius, phi = np.sqrt(radius2), 2 * np.pi * turn
+    x, y, z = _fixed(radius * np.cos(phi), radius * np.sin(phi), np.sqrt(1 - radius2))
+    return x, y, z
+
+
+@functools.cache
 def gauss(count: int) -> tuple[np.ndarray, np.ndarray]:
     """Nodes in [0, 1] and weights of the quadrature of Gauss and Legendre, (count,) each; not to be written to."""
     x, weight = np.polynomial.legendre.leggauss(count)

@@ -792,10 +792,8 @@ def _passing(transmission: Transmission, layout: Layout, solved: Energies, cosin
         solved.nodes, light, float(ops.mean(internal_reflections.bound(transmission))), sines
     )
     numbers = np.array([np.interp(cosines, incidences, each) for each in at_incidences])
-    o = low_discrepancy.fibonacci(EVENLY)
-    radius, phi = np.sqrt(o[0]), 2 * np.pi * o[1]
     i = internal_reflections.seen_below(transmission, _of_cosines(cosines[:, None]))
-    evenly = radius * np.cos(phi), radius * np.sin(phi), np.sqrt(1 - o[0])
+    evenly = low_discrepancy.even_in_projection(EVENLY)
     numbers = numbers / internal_reflections.diffuse([*numbers[..., None]], i, evenly).mean(axis=-1)
     value, density = internal_reflections.eval_pdf_rest(Rest(None, 1.0, 1.0, [*numbers[..., None]]), i, evenly)
     return np.concatenate([numbers, np.max(value / density, axis=-1)[None]])

@@ -80,7 +80,7 @@ def columns(
 def _forward(numbers: Array, i: Direction) -> Array:
     """Shares (M,) of the momentum of light from directions i (M,), about which samples have the same mean momentum as
     light that passes by numbers (COUNT, M)."""
-    x, y, z = _evenly()
+    x, y, z = low_discrepancy.even_in_projection(EVENLY)
     length = np.hypot(i[0], i[1])
     lit = wide.density([*numbers[..., None]], (length[:, None], 0 * x, i[2][:, None]), (x, y, z))
     known = [forward.moved(float(share), (-1.0, 0.0, 0.0), (x, y, z))[0].mean() for share in FORWARD]
@@ -96,7 +96,7 @@ def shared(found: Columns, shares: Array, view: View, folded: Folded | Listed) -
     # Azimuths hardly matter where light is wide
     cosine = folded.around(np.arange(float(len(folded.at_cosines[2])))).astype(int)
     first = np.unique(cosine, return_index=True)[1]
-    x, y, z = (np.tile(each, len(first)) for each in _evenly())
+    x, y, z = (np.tile(each, len(first)) for each in low_discrepancy.even_in_projection(EVENLY))
     of, i = view(np.repeat(first, EVENLY))
     assert of.columns.passes
     alone = {name: row[:, None] for name, row in zip(Parts.CHANCES, np.eye(len(Parts.CHANCES)))}
@@ -118,10 +118,3 @@ def shared(found: Columns, shares: Array, view: View, folded: Folded | Listed) -
     after = after * ops.divide(before.sum(axis=0), after.sum(axis=0))
     chance, *chances = before + shares * (after - before)
     return replace(found, chance=chance, passes=replace(passes, **dict(zip(Parts.CHANCES, chances))))
-
-
-def _evenly() -> Direction:
-    """Directions above that are even in projection."""
-    radius2, turn = low_discrepancy.fibonacci(EVENLY)
-    radius = np.sqrt(radius2)
-    return radius * np.cos(2 * np.pi * turn), radius * np.sin(2 * np.pi * turn), np.sqrt(1 - radius2)
