@@ -20,7 +20,7 @@ from velatura.figures.neighbours import ClearCoat, FilmedMetal
 from velatura.optics import films
 from velatura.optics.coatings import RANGE_NM, Coating, ColouredFilm
 from velatura.stack import Film, Interface, Named, Stack, rgb, srgb_sensitivity
-from velatura.stack.spectra import SRGB_FROM_XYZ
+from velatura.stack.spectra import lab
 
 Array = canvas.Array
 
@@ -120,14 +120,7 @@ def _albedo(made: Any, cosine: float, paths: int, seed: int) -> Array:
 
 def colour_difference(a: Array, b: Array) -> Array:
     """Distance in L*a*b* of colours (..., 3) in linear sRGB, white being that of D65 (CIE 1976)."""
-    return np.asarray(np.linalg.norm(_lab(a) - _lab(b), axis=-1))
-
-
-def _lab(colour: Array) -> Array:
-    xyz_from_srgb = np.linalg.inv(SRGB_FROM_XYZ)
-    t = colour @ xyz_from_srgb.T / xyz_from_srgb.sum(axis=1)
-    x, y, z = np.moveaxis(np.where(t > (6 / 29) ** 3, np.cbrt(t), t / (3 * (6 / 29) ** 2) + 4 / 29), -1, 0)
-    return np.stack([116 * y - 16, 500 * (x - y), 200 * (y - z)], axis=-1)
+    return np.asarray(np.linalg.norm(lab(a) - lab(b), axis=-1))
 
 
 @canvas.page()

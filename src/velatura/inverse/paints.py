@@ -38,7 +38,7 @@ from velatura.stack import (
 )
 from velatura.stack.pigments import COLUMNS, absorption, scattering
 from velatura.stack.schema import show
-from velatura.stack.spectra import SRGB_FROM_XYZ
+from velatura.stack.spectra import lab
 from velatura.stack.tables import read
 
 Array = NDArray[np.floating]
@@ -501,15 +501,6 @@ def observer() -> tuple[Array, Array]:
     nm, weights = srgb_weights()
     kept = (nm >= VISIBLE_NM[0]) & (nm <= VISIBLE_NM[1]) & (nm % 10 == 0)
     return nm[kept], weights[:, kept] / weights[:, kept].sum(axis=1, keepdims=True)
-
-
-def lab(rgb: ArrayLike) -> Array:
-    """L*, a* and b* of linear sRGB under D65 (CIE 1976)."""
-    xyz_from_rgb = np.linalg.inv(np.array(SRGB_FROM_XYZ))
-    x, y, z = (xyz_from_rgb @ np.asarray(rgb, float)) / xyz_from_rgb.sum(axis=1)
-    edge = 6 / 29
-    fx, fy, fz = (np.where(t > edge**3, np.cbrt(t), t / (3 * edge**2) + 4 / 29) for t in (x, y, z))
-    return np.array([116 * fy - 16, 500 * (fx - fy), 200 * (fy - fz)])
 
 
 def _with_concentrations(stack: Stack, shares: Array) -> Stack:

@@ -292,6 +292,17 @@ def luminance_sensitivity(wavelengths_nm: NDArray[np.floating]) -> NDArray[np.fl
     return shares
 
 
+def lab(rgb: NDArray[np.floating]) -> NDArray[np.float64]:
+    """L*, a* and b* (..., 3) of linear sRGB (..., 3), white being that of D65 (CIE 1976)."""
+    import numpy as np
+
+    xyz_from_rgb = np.linalg.inv(SRGB_FROM_XYZ)
+    t = rgb @ xyz_from_rgb.T / xyz_from_rgb.sum(axis=1)
+    edge = 6 / 29
+    x, y, z = np.moveaxis(np.where(t > edge**3, np.cbrt(t), t / (3 * edge**2) + 4 / 29), -1, 0)
+    return np.stack([116 * y - 16, 500 * (x - y), 200 * (y - z)], axis=-1)
+
+
 def _sellmeier(dispersion: Dispersion, wavelength_um: NDArray[np.float64]) -> NDArray[np.float64]:
     square = wavelength_um**2
     index: NDArray[np.float64] = (1 + sum(b * square / (square - c) for b, c in dispersion.terms)) ** 0.5
