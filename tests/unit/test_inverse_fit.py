@@ -404,10 +404,10 @@ def test_an_rgl_file(tmp_path: Path) -> None:
         load_table(path)
 
     path.write_bytes(tensors(fields)[:-8])
-    with pytest.raises(InvalidInput, match=r"paint_rgb\.bsdf: is no RGB file of the RGL database: its head is broken"):
+    with pytest.raises(InvalidInput, match=r"paint_rgb\.bsdf: is no file of tensors: its head is broken"):
         load_table(path)
     path.write_bytes(b"nothing of the kind")
-    with pytest.raises(InvalidInput, match=r"paint_rgb\.bsdf: is no RGB file of the RGL database"):
+    with pytest.raises(InvalidInput, match=r"paint_rgb\.bsdf: line 1: must be Source, got 'nothing'"):
         load_table(path)
     with pytest.raises(InvalidInput, match=r"none\.bsdf: file not found"):
         load_table(tmp_path / "none.bsdf")

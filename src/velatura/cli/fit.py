@@ -24,7 +24,8 @@ def fit(
         typer.Argument(
             metavar="TABLE",
             help="CSV (theta_i,theta_o,phi,r,g,b or theta_i,phi_i,theta_o,phi_o,r,g,b, in degrees and 1/sr), "
-            "or a file of the MERL (.binary) or RGL (_rgb.bsdf) database.",
+            "or a measurement of MERL (.binary), RGL (_rgb.bsdf, _spec.bsdf), KAIST (.pbsdf), by ASTM E1392 (.astm), "
+            "or of Zemax (.bsdf).",
         ),
     ],
     target: Annotated[

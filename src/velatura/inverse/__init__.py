@@ -8,7 +8,6 @@ from velatura.inverse.coats import Coated, coat
 from velatura.inverse.fitting.angles import Directions, ReflectanceTable, table_of
 from velatura.inverse.fitting.descent import Estimate, Fit, Other, fit
 from velatura.inverse.fitting.simplify import fit_target, simplify
-from velatura.inverse.fitting.table_files import load_table
 from velatura.inverse.invert import alternatives, grazing, invert_stack, on_black
 from velatura.inverse.lobes import smooth_pair
 from velatura.inverse.lobes.equivalence import Coordinate, EquivalenceClass
@@ -16,6 +15,7 @@ from velatura.inverse.lobes.interface import Choice, invert_interface
 from velatura.inverse.lobes.pair import Pair, invert_pair
 from velatura.inverse.lobes.partial_stack import Above, Layers
 from velatura.inverse.lobes.target import Fixed, Target, TargetLobe, load_target
+from velatura.inverse.measured import load_table
 from velatura.inverse.paints import Paint, PigmentFit, fit_pigment, load_reflectances, paint, paint_colour
 from velatura.inverse.reasons import Direction, Infeasible
 from velatura.inverse.solution import Solution

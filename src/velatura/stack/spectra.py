@@ -273,6 +273,18 @@ def srgb_weights(d65: bool = True) -> tuple[NDArray[np.float64], NDArray[np.floa
     return wavelengths_nm, weights / weights.sum(axis=1, keepdims=True)
 
 
+def srgb_of_samples(wavelengths_nm: NDArray[np.floating]) -> NDArray[np.float64]:
+    """The matrix (3, N) from a spectrum's values at wavelengths (N,), ascending, to linear sRGB under D65.
+
+    Between them the spectrum is straight; beyond its ends the last value holds.
+    """
+    import numpy as np
+
+    at, weights = srgb_weights()
+    shares = np.stack([np.interp(at, wavelengths_nm, each) for each in np.eye(len(wavelengths_nm))], axis=1)
+    return np.asarray(weights @ shares)
+
+
 def srgb_sensitivity(wavelengths_nm: NDArray[np.floating]) -> NDArray[np.float64]:
     """Sensitivities (3, N) of linear sRGB under D65 at wavelengths (N,), in proportion; 0 where light is not visible.
 

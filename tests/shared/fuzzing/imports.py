@@ -286,9 +286,56 @@ def _rgl(rng: np.random.Generator) -> Files:
     return {"a.bsdf": tensors(fields)}
 
 
+def _rgl_spectra(rng: np.random.Generator) -> Files:
+    single, n = np.float32, int(rng.integers(1, 5))
+    fields: dict[str, np.ndarray] = {
+        "description": np.frombuffer(b"made", np.uint8),
+        "jacobian": np.array([1], np.uint8),
+        "theta_i": np.array([0, 0.8, 1.5], single),
+        "phi_i": np.zeros(1, single),
+        "ndf": rng.uniform(0.1, 1, (4, 4)).astype(single),
+        "sigma": rng.uniform(0.1, 1, (4, 4)).astype(single),
+        "vndf": np.ones((1, 3, 4, 4), single),
+        "luminance": np.ones((1, 3, 4, 4), single),
+        "wavelengths": np.linspace(400, 700, n).astype(single),
+        "spectra": rng.uniform(0, 1, (1, 3, n, 4, 4)).astype(single),
+    }
+    return {"a.bsdf": tensors(fields)}
+
+
+def _polarised(rng: np.random.Generator) -> Files:
+    single, counts = np.float32, [int(n) for n in rng.integers(1, 4, 3)]
+    axes = {
+        name: np.linspace(0, 1.2, n)[None].astype(single) for name, n in zip(("phi_d", "theta_d", "theta_h"), counts)
+    }
+    wavelengths = np.array([450, 550, 650], np.uint16)
+    matrices = rng.uniform(-0.1, 1, (*counts, 3, 4, 4)).astype(single)
+    return {"a.pbsdf": tensors({**axes, "wvls": wavelengths, "M": matrices})}
+
+
+def _astm(rng: np.random.Generator) -> Files:
+    names = str(rng.choice(["BRDF", "R,G,B", "X,Y,Z", "450nm,550nm,650nm"]))
+    rows = (rng.uniform(0, 1.5, 5 + names.count(",")) for _ in range(5))
+    lines = [
+        f"NUM_POINTS 5\nVARS theta_i,phi_i,theta_s,phi_s,{names}",
+        *(",".join(f"{x:.3f}" for x in row) for row in rows),
+    ]
+    return {"a.astm": "\n".join(lines).encode()}
+
+
+def _zemax(rng: np.random.Generator) -> Files:
+    content = str(rng.choice(["Monochrome", "XYZ"]))
+    text = f"Source Measured\nSymmetry PlaneSymmetrical\nSpectralContent {content}\nScatterType BRDF\n"
+    text += "SampleRotation 1\n0\nAngleOfIncidence 2\n0 40\nScatterAzimuth 2\n0 180\nScatterRadial 3\n0 5 30\n"
+    for name in ("Monochrome",) if content == "Monochrome" else [f"Tristimulus{x}" for x in "XYZ"]:
+        blocks = (" ".join(f"{x:.3f}" for x in rng.uniform(0, 1, 6)) for _ in range(2))
+        text += f"{name}\nDataBegin\n" + "".join(f"TIS 0.5\n{block}\n" for block in blocks) + "DataEnd\n"
+    return {"a.bsdf": text.encode()}
+
+
 def tensors(fields: dict[str, np.ndarray]) -> bytes:
     """Arrays in the format of tensor files: a head with names, types, places and shapes, then the numbers."""
-    types = {np.dtype(np.uint8): 1, np.dtype(np.float32): 10}
+    types = {np.dtype(np.uint8): 1, np.dtype(np.uint16): 3, np.dtype(np.float32): 10}
     head, body = b"tensor_file\0" + bytes([1, 0]) + struct.pack("<I", len(fields)), b""
     begin = len(head) + sum(2 + len(name) + 2 + 1 + 8 + 8 * field.ndim for name, field in fields.items())
     for name, field in fields.items():
@@ -333,6 +380,10 @@ KINDS: dict[str, tuple[Callable[[np.random.Generator], Files], Callable[[Path], 
     "csv": (_csv, _table, False),
     "merl": (_merl, _table, True),
     "rgl": (_rgl, _table, True),
+    "rgl-spectra": (_rgl_spectra, _table, True),
+    "polarised": (_polarised, _table, True),
+    "astm": (_astm, _table, False),
+    "zemax": (_zemax, _table, False),
     "texture": (_picture, _texture, True),
 }
 
