@@ -2,7 +2,8 @@
 
 `<!-- parameters -->` becomes the table of a material's parameters, `<!-- help VERB -->` the output of
 `velatura VERB --help`, `<!-- presets -->` a card for each preset, `<!-- substances -->` the table of the pages of
-refractiveindex.info that come with the package.
+refractiveindex.info that come with the package, `<!-- retrieved MODEL -->` that of the layers that the inverse
+retrieves by a model for the figures of Bati et al. 2021, each with a link to its file.
 
 `{{belcour2018-13: rmse/forward}}` becomes a number of `docs/figures/belcour2018-13.json`, which `make figures`
 computes. After the figure's name stand the keys that lead to the number; an item of a list has an index or its name. A
@@ -29,6 +30,8 @@ from functools import cache
 from math import floor, log10
 from pathlib import Path
 from typing import Any
+
+import numpy as np
 
 ROOT = Path(__file__).parents[1]
 PACKAGE = ROOT / "src" / "velatura"
@@ -75,6 +78,7 @@ def setup(app: Any) -> dict[str, bool]:
     app.setup_extension("sphinx.ext.autodoc")
     app.connect("builder-inited", _forget_old_examples, priority=100)  # before the gallery
     app.connect("builder-inited", forget_old_pages, priority=100)  # before autosummary
+    app.connect("builder-inited", _write_retrieved)
     app.connect("source-read", _on_source_read)
     app.connect("autodoc-process-signature", _on_signature)
     app.connect("autodoc-process-docstring", _on_docstring)
@@ -145,6 +149,7 @@ def replaced(markdown: str) -> str:
     markdown = re.sub(r"<!-- parameters -->", lambda _: _parameters(), markdown)
     markdown = re.sub(r"<!-- presets -->", lambda _: _presets(), markdown)
     markdown = re.sub(r"<!-- substances -->", lambda _: _substances(), markdown)
+    markdown = re.sub(r"<!-- retrieved (\w+) -->", lambda match: _retrieved(match[1]), markdown)
     markdown = re.sub(r"<!-- table (.*?): (.*?) -->", lambda match: _table(*match.groups()), markdown)
     markdown = re.sub(r"\{\{(.*?)\}\}", lambda match: _number(match[1]), markdown)
     markdown = re.sub(r"\]\(((?:\.\./)*)examples/(\w+)\.py\)", r"](\1gallery/\2.rst)", markdown)
@@ -175,6 +180,68 @@ def _substances() -> str:
         cells = (f"`{row['name']}`", row["substance"], f"{low:.0f} to {high:.0f}", row["colour"] or "", row["source"])
         rows.append(f"| {' | '.join(cells)} |")
     return "\n".join(rows)
+
+
+def _write_retrieved(app: Any) -> None:
+    """Write the files that `_retrieved` links to."""
+    from velatura.stack import save
+
+    folder = DOCS / "reference" / "retrieved"
+    folder.mkdir(exist_ok=True)
+    for model in ("bati2021", "velatura"):
+        for name, stack in retrieved(model).items():
+            save(stack, folder / _retrieved_file(name, model))
+
+
+@cache
+def retrieved(model: str) -> dict[str, Any]:
+    """The stacks of Bati et al. 2021 by figure: as the figures drew them, or those of the default model."""
+    from velatura.figures.bati2021_targets import FIGURES
+    from velatura.inverse import invert_stack
+    from velatura.stack import Stack
+
+    if model != "bati2021":
+        return {name: invert_stack(lobes, model).stack for name, lobes in FIGURES.items()}
+    found = {}
+    for path in sorted((DOCS / "figures").glob("bati2021-*.json")):
+        numbers, number = _figure(path.stem), str(int(path.stem[-2:]))
+        looks = numbers.get("looks") or [
+            {"name": key, **each} for key, each in numbers.items() if isinstance(each, dict) and "stack" in each
+        ]
+        for look in looks:
+            name = look["name"] if look["name"].split()[0] == number else f"{number} {look['name']}"
+            found[name] = Stack.from_dict(look["stack"])
+    return found
+
+
+def _retrieved(model: str) -> str:
+    rows = ["| figure | layers | file |", "|---|---|---|"]
+    for name, stack in retrieved(model).items():
+        layers = "; ".join(filter(None, (_layer(layer) for layer in stack.layers)))
+        file = _retrieved_file(name, model)
+        rows.append(f"| {name} | {layers} | [{file}](retrieved/{file}) |")
+    return "\n".join(rows)
+
+
+def _retrieved_file(name: str, model: str) -> str:
+    """The name of a file: letters, digits and hyphens."""
+    return f"{'-'.join(re.findall('[a-z0-9]+', name.lower()))}-{model}.yaml"
+
+
+def _layer(layer: Any) -> str:
+    """The values of a layer, as a figure of the paper has them."""
+
+    def written(value: Any) -> str:
+        values = value if isinstance(value, (list, tuple)) else [value]
+        return " ".join(f"{each:.4g}" for each in values)
+
+    values = layer.to_dict()
+    if layer.kind == "medium":
+        depth = [float(each) * layer.depth for each in np.atleast_1d(layer.sigma_a)]
+        return f"depth {written(depth)}" if any(depth) else ""
+    if layer.kind == "diffuse":
+        return f"diffuse {written(layer.albedo)}"
+    return ", ".join(f"{key} {written(values[key])}" for key in ("eta", "k", "alpha") if key in values)
 
 
 def _card(name: str, material: Any, distance: dict[str, float]) -> str:

@@ -14,6 +14,7 @@ from benchmarks import tool
 
 import velatura
 from velatura.figures import FIGURES
+from velatura.figures.bati2021_targets import FIGURES as FIGURES_OF_LOBES
 
 ROOT = Path(__file__).parents[2]
 
@@ -160,3 +161,12 @@ def test_every_preset_has_its_distance_and_its_picture() -> None:
     pictures = ROOT / "src" / "velatura" / "editor" / "page" / "thumbnails"
     assert tuple(distances) == velatura.presets()
     assert {path.stem for path in pictures.glob("*.jpg")} == set(velatura.presets())
+
+
+def test_the_retrieved_layers_are_those_of_every_figure(hooks: ModuleType) -> None:
+    """Expected: a file of its own for each, and stacks for each figure of Bati et al. 2021 that shows lobes found."""
+    found = hooks.retrieved("bati2021")
+    assert len({hooks._retrieved_file(name, "bati2021") for name in found}) == len(found)
+    shown = {name.split()[0] for name in FIGURES_OF_LOBES} - {"23"}  # whose stacks are those of 15 (b)
+    assert shown <= {name.split()[0] for name in found}
+    assert "eta 1.287, alpha 0.0628; depth 0.8227 0.2582 0; eta 2.273, alpha 0.04033" in hooks._retrieved("bati2021")
