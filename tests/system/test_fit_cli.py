@@ -52,6 +52,8 @@ def test_a_fit_says_what_the_table_determines(run: Run, folder: Path) -> None:
     assert [one["name"] for one in report["parameters"]] == ["layer0_alpha", "layer0_eta"]
     assert all(one["low"] <= one["value"] <= one["high"] for one in report["parameters"])
     assert {"trades", "others"} <= report.keys()
+    assert report["model_error"]["walks"] == 1000 and "itself beside walks of this stack" in out
+    assert "model_error" not in json.loads(run(*arguments, "--json", "--walks", "0")[1])
 
 
 def test_a_brushed_table_is_read(run: Run, folder: Path) -> None:

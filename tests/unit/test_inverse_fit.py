@@ -11,7 +11,17 @@ from benchmarks import benchmark
 from fuzzing.imports import tensors
 
 from velatura.errors import InvalidInput
-from velatura.inverse import Directions, ReflectanceTable, fit, fit_target, load_table, simplify, table_of
+from velatura.inverse import (
+    Directions,
+    Fit,
+    ReflectanceTable,
+    fit,
+    fit_target,
+    load_table,
+    model_error,
+    simplify,
+    table_of,
+)
 from velatura.inverse.fitting import angles, descent
 from velatura.inverse.fitting.simplify import _merged, _of_sets, _turned, compared
 from velatura.model import Model, named, variance_kind
@@ -495,3 +505,19 @@ def test_a_simpler_stack_that_fits_as_well_is_reported() -> None:
 def test_the_same_minimum_is_reported_once() -> None:
     table = table_of(COATED, Directions.about_lobes(False), AVERAGED)
     assert fit(table, [COATED, COATED.replace(layer0_alpha=0.12)], AVERAGED).others == []
+
+
+def test_the_error_of_a_model_beside_walks() -> None:
+    """Expected: none for one facet of a metal, whose reflectance and masking are in closed form; for a coated one less
+    than the papers' model has, as in the benchmark. Noise falls with the number of walks."""
+    directions = Directions.about_lobes(False)
+    metal = Stack([Interface(eta=1.5, k=4.0, alpha=0.02)])
+    single = named("belcour2018", reflectance="fresnel")
+    known = model_error(Fit(metal, single, 0, [], []), directions)
+    assert known.error < 2e-3 and known.noise < 1e-3
+    few, many, papers = (
+        model_error(Fit(COATED, named(model), 0, [], []), directions, walks)
+        for model, walks in (("velatura", 400), ("velatura", 1600), ("belcour2018", 1600))
+    )
+    assert many.error < 0.5 * papers.error
+    assert many.noise < 0.8 * few.noise

@@ -11,7 +11,7 @@ import typer
 from velatura.cli import invert, options, progress
 
 if TYPE_CHECKING:
-    from velatura.inverse import Fit, ReflectanceTable
+    from velatura.inverse import Fit, ModelError, ReflectanceTable
 
 Output = Annotated[Path | None, typer.Option("--output", "-o", metavar="F", help="The material (YAML or JSON).")]
 
@@ -37,6 +37,12 @@ def fit(
     ],
     starts: Annotated[int, typer.Option(min=1, max=100, metavar="N", help="Stacks to descend from.")] = 4,
     output: Output = None,
+    walks: Annotated[
+        int,
+        typer.Option(
+            min=0, max=10**6, metavar="N", help="Random walks per direction that the model is held against; 0 for none."
+        ),
+    ] = 1000,
     seed: Annotated[int, typer.Option(min=0, max=2**31 - 1, metavar="N", help="Seed of these stacks.")] = 0,
     plot: Annotated[bool, typer.Option("--plot", help="Draw table and fit to TABLE, ending in .png, here.")] = False,
     model: options.Model = None,
@@ -45,8 +51,8 @@ def fit(
 ) -> None:
     """Find the stack closest to a table of reflectance over angles.
 
-    Reports the interval of each parameter (95 %), the parameters of which one makes up for the other, and other
-    stacks that fit as well.
+    Reports the interval of each parameter (95 %), the parameters of which one makes up for the other, other stacks
+    that fit as well, and the error of the model itself beside random walks of the stack, below which no fit is known.
     """
     # Refuse what cannot work before anything slow begins
     from velatura import inverse
@@ -57,9 +63,10 @@ def fit(
     picture = invert.picture(table) if plot else None
     with progress.clock(f"Fitting {Path(table).name}"):
         found = inverse.fit_target(rows, wanted, starts, name, seed, **switches)
+        own = inverse.model_error(found, rows.directions, walks, seed) if walks else None
     if picture:
         draw(rows, found, wanted.name or Path(table).name, picture)
-    show(found, output, picture, as_json)
+    show(found, output, picture, as_json, own)
 
 
 def check(output: Path | None) -> None:
@@ -70,18 +77,21 @@ def check(output: Path | None) -> None:
         files.check_writable(output, "a material file", invert.ENDINGS)
 
 
-def show(found: Fit, output: Path | None, picture: Path | None, as_json: bool) -> None:
-    """Write the material, and print it with its error, and the name of a picture of it."""
+def show(found: Fit, output: Path | None, picture: Path | None, as_json: bool, own: ModelError | None = None) -> None:
+    """Write the material, and print it with its error, that of the model itself, and the name of a picture of it."""
     from velatura.stack import dumps, save
 
     if output:
         save(found.stack, output)
     if as_json:
-        print(json.dumps({"model": found.model.name, **found.to_dict()}, allow_nan=False))
+        walked = {"model_error": vars(own)} if own else {}
+        print(json.dumps({"model": found.model.name, **found.to_dict(), **walked}, allow_nan=False))
         return
     console = options.console()
     of = "log(1 + f cos), and ten times of energies" if found.energies else "log(1 + f cos)"
     print(f"Error of {of}: {found.error:.2g} (from other starts: {_others(found)})")
+    if own:
+        print(f"Error of {found.model.name} itself beside walks of this stack: {own.error:.2g} (noise {own.noise:.2g})")
     console.print(_table(found))
     if found.energies:
         console.print(_energies(found))

@@ -7,6 +7,7 @@ read by the model's own recursion, so that what is found holds for the model tha
 from velatura.inverse.coats import Coated, coat
 from velatura.inverse.fitting.angles import Directions, ReflectanceTable, table_of
 from velatura.inverse.fitting.descent import Estimate, Fit, Other, fit
+from velatura.inverse.fitting.model_error import ModelError, model_error
 from velatura.inverse.fitting.simplify import fit_target, simplify
 from velatura.inverse.invert import alternatives, grazing, invert_stack, on_black
 from velatura.inverse.lobes import smooth_pair
@@ -33,6 +34,7 @@ __all__ = [
     "Fixed",
     "Infeasible",
     "Layers",
+    "ModelError",
     "Other",
     "Paint",
     "Pair",
@@ -53,6 +55,7 @@ __all__ = [
     "load_reflectances",
     "load_table",
     "load_target",
+    "model_error",
     "on_black",
     "paint",
     "paint_colour",
