@@ -44,11 +44,12 @@ def compute(
     images = {}
     for column in canvas.track(list(COLUMNS), progress):
         name, options = COLUMNS[column]
-        samples = [canvas.sampled(stack, name, cosine, paths, seed, **options) for cosine in COSINES]
+        made = canvas.bsdf(stack, name, **options)
+        samples = [canvas.sampled(made, cosine, paths, seed) for cosine in COSINES]
         albedo = np.array([s.weight.mean(axis=0) for s in samples])
         numbers["albedo"][column] = albedo.tolist()
         numbers["saturation"][column] = (1 - albedo[:, 2] / albedo[:, 0]).tolist()
-        images[column] = canvas.spheres(stack, name, "studio", size, spp, seed + (column == "single"), **options)
+        images[column] = canvas.taken(made, name, "sphere", "studio", size, spp, seed + (column == "single"))
 
     numbers["pictures"] = {column: passes.mean(axis=0).tolist() for column, passes in images.items()}
     true = images.pop("all")

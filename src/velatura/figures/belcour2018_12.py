@@ -34,9 +34,9 @@ def compute(
     numbers |= {name: {} for name in STACKS}
     for name, column in canvas.track([(name, column) for name in STACKS for column in canvas.COLUMNS], progress):
         stack, (model, switches) = preset(STACKS[name]), canvas.COLUMNS[column]
-        samples = (canvas.sampled(stack, model, cosine, paths, seed, **switches) for cosine in cosines)
-        numbers[name][column] = [float(each.weight.mean()) for each in samples]
-        passes = canvas.spheres(stack, model, "furnace", size, spp, seed, **switches)
+        made = canvas.bsdf(stack, model, **switches)
+        numbers[name][column] = [float(canvas.sampled(made, x, paths, seed).weight.mean()) for x in cosines]
+        passes = canvas.taken(made, model, "sphere", "furnace", size, spp, seed)
         numbers["pictures"].setdefault(name, {})[column] = passes.mean(axis=0).tolist()
     return numbers
 

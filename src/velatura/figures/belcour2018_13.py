@@ -35,10 +35,11 @@ def compute(
     images = {}
     for name in canvas.track(list(canvas.COLUMNS), progress):
         model, switches = canvas.COLUMNS[name]
-        each = [canvas.sampled(stack, model, cosine, paths, seed, **switches) for cosine in COSINES]
+        made = canvas.bsdf(stack, model, **switches)
+        each = [canvas.sampled(made, cosine, paths, seed) for cosine in COSINES]
         numbers["albedo"][name] = [s.weight.mean(axis=0).tolist() for s in each]
         numbers["blur"][name] = [_blur(s.wo, s.weight.mean(axis=1), cosine) for s, cosine in zip(each, COSINES)]
-        images[name] = canvas.spheres(stack, model, "studio", size, spp, seed, **switches)
+        images[name] = canvas.taken(made, model, "sphere", "studio", size, spp, seed)
 
     numbers["pictures"] = {name: passes.mean(axis=0).tolist() for name, passes in images.items()}
     true = images.pop("reference")

@@ -115,11 +115,11 @@ def ratio(seconds: Array, others: Array) -> tuple[float, float]:
     return float(median), float(np.sqrt(np.pi / 2 / seconds.size) * (upper - lower) / 1.349)
 
 
-def sampled(stack: Stack, model: str, cosine: float, paths: int, seed: int, **switches: Any) -> ProbeSamples:
+def sampled(made: Any, cosine: float, paths: int, seed: int) -> ProbeSamples:
     """Lobe of a BSDF for light from one direction in the plane of the tangent."""
     wi = np.array([np.sqrt(1 - cosine**2), 0, cosine])
     u = np.random.default_rng(seed).random((paths, 3))
-    return Probe(bsdf(stack, model, **switches)).sample(np.tile(wi, (paths, 1)), u)
+    return Probe(made).sample(np.tile(wi, (paths, 1)), u)
 
 
 def rmse(passes: Array, others: Array) -> tuple[float, float]:

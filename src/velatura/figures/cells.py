@@ -128,11 +128,6 @@ def _last(found: Any) -> reference.WalkedLobe:
     return reference.WalkedLobe(found.energy[-1], found.alpha[-1], found.rotation[-1], unknown, unknown)
 
 
-def alpha(cell: Mapping[str, Any], title: str) -> Any:
-    """The roughness of a cell's last lobe as an array (cosines, 2)."""
-    return np.array(cell["alpha"][title])
-
-
 def draw(numbers: dict[str, Any], path: str | Path, exposure: float = 1.0, bound: float = 0.2) -> None:
     """The truth of each cell, and for each model its picture, and what it has too much or too little, up to a bound.
 

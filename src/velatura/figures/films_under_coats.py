@@ -14,7 +14,6 @@ from typing import Any
 import numpy as np
 
 from velatura import scenes
-from velatura.checks.probe import Probe
 from velatura.figures import Progress, canvas, neighbours
 from velatura.figures.neighbours import ClearCoat, FilmedMetal
 from velatura.optics import films
@@ -70,7 +69,10 @@ def compute(
         stack = stack_of(metal, coat)
         made = {who: canvas.bsdf(stack, who) for who in (TRUTH, OURS)}
         made |= {who: neighbours.bsdf(show(metal, coat)) for who, show in neighbours.NEIGHBOURS.items()}
-        albedo = {who: [_albedo(one, cosine, paths, seed) for cosine in COSINES] for who, one in made.items()}
+        albedo = {
+            who: [canvas.sampled(one, cosine, paths, seed).weight.mean(axis=0) for cosine in COSINES]
+            for who, one in made.items()
+        }
         images = {who: canvas.taken(one, who, "sphere", "studio", size, spp, seed) for who, one in made.items()}
         pictures.append({who: passes.mean(axis=0).tolist() for who, passes in images.items()})
         cell: dict[str, Any] = {"name": name, "albedo": {who: np.array(x).tolist() for who, x in albedo.items()}}
@@ -109,13 +111,6 @@ def integration(cosines: Sequence[float] = (1.0, 0.5)) -> dict[str, Any]:
     return {
         who: {"most": float(np.abs(found).max()), "mean": float(np.abs(found).mean())} for who, found in errors.items()
     }
-
-
-def _albedo(made: Any, cosine: float, paths: int, seed: int) -> Array:
-    """Reflected light (3,) for a direction."""
-    wi = np.array([np.sqrt(1 - cosine**2), 0, cosine])
-    u = np.random.default_rng(seed).random((paths, 3))
-    return np.asarray(Probe(made).sample(np.tile(wi, (paths, 1)), u).weight.mean(axis=0))
 
 
 def colour_difference(a: Array, b: Array) -> Array:

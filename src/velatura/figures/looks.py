@@ -26,7 +26,6 @@ Array = NDArray[np.floating]
 
 MODEL = "bati2021"
 COSINES = (1.0, 0.9, 0.8, 0.7, 0.6, 0.5, 0.4, 0.3, 0.2, 0.1)
-GRAZING = COSINES.index(0.2)
 SIZE, SAMPLES = 256, 64  # of a picture: pixels along a side, and samples of each
 
 WIDTH, HEIGHT = 3.1, 2.6  # of a panel's column, and of a row, in inches

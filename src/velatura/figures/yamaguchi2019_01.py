@@ -14,7 +14,8 @@ from typing import Any
 
 import numpy as np
 
-from velatura.figures import Progress, canvas, cells, maps
+from velatura.figures import Progress, canvas, maps
+from velatura.figures.cells import draw as draw
 from velatura.figures.yamaguchi2019 import CHOICES, SPREAD, STACKS, stack
 from velatura.stack import Interface, Stack
 
@@ -66,12 +67,3 @@ def compute(
         numbers["cells"].append({"name": name, **found})
         numbers["pictures"].append({title: passes.mean(axis=0).tolist() for title, passes in images.items()})
     return numbers
-
-
-def draw(numbers: dict[str, Any], path: str | Path) -> None:
-    """The truth, and both models, with what they have too much or too little.
-
-    Raises:
-        InvalidInput: the file cannot be written.
-    """
-    cells.draw(numbers, path)
