@@ -29,7 +29,7 @@ HELD = ("invert", "member", "snapped")  # calls while something is dragged
 
 
 def timed(call: Callable[[Any], Any], body: Any, into: list[float]) -> Any:
-    """What a call answers; its seconds are added to a list."""
+    """The answer of a call; its seconds are added to a list."""
     start = time.process_time()
     answer = call(body)
     into.append(time.process_time() - start)

@@ -1,4 +1,4 @@
-"""What the presets lose as parameters of other programs: the tables of docs/how-to/bakes.md.
+"""Loss of the presets as parameters of other programs: the tables of docs/how-to/bakes.md.
 
     python benchmarks/bakes.py [--presets NAME ...] [--targets NAME ...] [--round-trips N]
 

@@ -288,7 +288,7 @@ def _values(n: float, coat: Any, base: Any, tau: Any, eta: Any, k: Any) -> dict[
 def walked(
     stack: Stack, seed: int, paths: int, cosines: tuple[float, ...], azimuths: tuple[float, ...]
 ) -> dict[str, Any]:
-    """What the metal reflects below the coat; the name of the stack is the seed of its walks."""
+    """Light that the metal reflects below the coat; the name of the stack is the seed of its walks."""
     once, often = (
         vt.reference.statistics(stack, cosines, np.radians(azimuths), paths, int(stack.name), microsurface)
         for microsurface in (False, True)

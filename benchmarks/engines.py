@@ -1,4 +1,4 @@
-"""What shaders cost an engine: instructions and bytes per pixel, counted in SPIR-V, for presets and models.
+"""Cost of shaders in an engine: instructions and bytes per pixel, counted in SPIR-V, for presets and models.
 
 Instructions are those of SPIR-V that compute, on vectors counted once, as glslangValidator writes them, in all rounds
 of loops and on both sides of branches; bytes are those of fetched texels. Of a pixel with one light: `vt_lobes` and

@@ -204,7 +204,7 @@ COSTS = {
 
 
 def evaluation(mi: Any, bsdf: Any, count: int) -> Callable[[int], None]:
-    """What evaluates random pairs of directions on the sphere."""
+    """A function that evaluates random pairs of directions on the sphere."""
     import drjit as dr
 
     rng = mi.PCG32(count)

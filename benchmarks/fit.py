@@ -88,7 +88,7 @@ def held(found: Fit, true: Stack) -> list[tuple[str, bool]]:
 
 
 def places(stack: Stack) -> list[tuple[str, int]]:
-    """What every layer is, and below how many interfaces it lies."""
+    """The kind of every layer, and below how many interfaces it lies."""
     found, above = [], 0
     for layer in stack.layers:
         found.append((layer.kind, above))

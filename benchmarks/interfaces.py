@@ -30,7 +30,7 @@ def stack(interfaces: int, alpha: float = 0.2) -> vt.Stack:
 
 
 def queries(mi: Any, bsdf: Any, count: int, sampled: bool) -> Callable[[int], None]:
-    """What evaluates random directions once, or draws them."""
+    """A function that evaluates random directions once, or draws them."""
     import drjit as dr
 
     rng = mi.PCG32(count)

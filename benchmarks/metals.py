@@ -54,7 +54,7 @@ def coated(coat: Coat, **metal: Any) -> Stack:
 
 
 def solved(stack: Stack) -> Array:
-    """What it reflects, (3, cosines)."""
+    """Light that it reflects, (3, cosines)."""
     found = vt.lobes(stack, COSINES)
     return np.asarray(sum(found.energy) + found.remainder)
 

@@ -1,4 +1,4 @@
-"""What the truth costs: the reference's efficiency with next-event estimation, and its statistics.
+"""Cost of the truth: the reference's efficiency with next-event estimation, and its statistics.
 
     python benchmarks/reference.py [--part model error efficiency statistics] [--renders 24]
 

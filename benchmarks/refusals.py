@@ -93,7 +93,7 @@ def possible(target: Target, n: int, reason: str, model: str) -> bool:
 
 
 def wrong(target: Target, refusal: Infeasible, model: str = DEFAULT) -> str | None:
-    """What is wrong with a refusal; None where nothing is."""
+    """The fault of a refusal; None without one."""
     if refusal.constraint != "sum" and not possible(target, refusal.lobe - 1, refusal.constraint, model):
         # Several may be in the way; then it is wrong only if lifting another one is enough
         others = [key for key in LIFTED if possible(target, refusal.lobe - 1, key, model)]

@@ -34,7 +34,7 @@ OPAQUE = ("coated-gold", "varnished-paint", "scattering-medium-over-gold", "furn
 
 
 def stacks() -> dict[str, vt.Stack]:
-    """What is measured: two interfaces and five, isotropic, all that the model has switched on."""
+    """The stacks that are measured: two interfaces and five, isotropic, all that the model has switched on."""
     metal = vt.Interface(conductor="Au", alpha=0.2)
     coats = [vt.Interface(eta=n, alpha=a) for n, a in ((1.5, 0.05), (1.7, 0.1), (1.4, 0.05), (1.6, 0.1))]
     return {"two interfaces": vt.Stack([coats[0], metal]), "five interfaces": vt.Stack([*coats, metal])}
@@ -76,7 +76,7 @@ def mixtures(mi, model: str) -> dict:
 
 
 def picture(mi, bsdf, size: int, spp: int):
-    """What renders the ball once, for a seed."""
+    """A function that renders the ball once, for a seed."""
     import drjit as dr
 
     description = scene_dict("ball", "studio", bsdf, (size, size), ZOOM)

@@ -1,4 +1,4 @@
-"""What programs share: their options, and rows, a printed line for each measurement and the same for `make bench`."""
+"""Options of programs, and their rows: a printed line for each measurement, and the same for `make bench`."""
 
 from __future__ import annotations
 

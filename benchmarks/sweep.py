@@ -1,4 +1,4 @@
-"""What sweeps cost beside what they compute, how they scale with workers, and what a scheduler of dask can bear.
+"""Cost of sweeps beside what they compute, how they scale with workers, and what a scheduler of dask can bear.
 
     python benchmarks/sweep.py [--part overhead small workers scheduler store] [--load burn|sleep]
 

@@ -127,7 +127,7 @@ def films() -> dict[str, Any]:
 
 
 def reflected(mixed: Mixed, cosines: Array) -> Array:
-    """What the model reflects (N,)."""
+    """Light that the model reflects (N,)."""
     with light_of(mixed.wavelength_nm):
         found = energies(Material.of(mixed.stack), cosines, 0 * cosines, None, nearly_straight)
     return np.asarray(((found.lobes + found.veils).sum(axis=0) + found.rest)[0])
@@ -244,8 +244,8 @@ def _variation(ours: Array, theirs: Array) -> Array:
 
 
 def _inside(alpha: float, momenta: Array) -> dict[str, Any]:
-    """What glass passes from inside: energies, ours and Mitsuba's, over n sin, and the worst difference, `energy`; the
-    `scale` of most values over Mitsuba's and of a single one, `value`, farthest from 1, where, and as a
+    """Light that glass passes from inside: energies, ours and Mitsuba's, over n sin, and the worst difference,
+    `energy`; the `scale` of most values over Mitsuba's and of a single one, `value`, farthest from 1, where, and as a
     share of the greatest one there; and how far the former is from 1 `within` the critical angle."""
     case = _case(Interface(eta=GLASS, alpha=alpha), -np.sqrt(1 - (momenta / GLASS) ** 2))
     pairs = Pairs.of(case)

@@ -68,7 +68,7 @@ def names() -> list[str]:
 
 
 def run(name: str, options: str) -> dict[str, Any]:
-    """What one command prints, its rows, and the circumstances."""
+    """The output of one command, its rows, and the circumstances."""
     with tempfile.NamedTemporaryFile("r", suffix=".jsonl", encoding="utf-8") as rows:
         command = [sys.executable, str(FOLDER / f"{name}.py"), *shlex.split(options)]
         load, begin = os.getloadavg()[0], time.perf_counter()

@@ -295,7 +295,7 @@ def _help(verb: list[str]) -> str:
 
 
 def _number(placeholder: str) -> str:
-    """What a placeholder stands for. Raises LookupError where no figure has that number."""
+    """The number that a placeholder stands for. Raises LookupError where no figure has that number."""
     match = re.fullmatch(r"([a-z0-9-]+): (.+?)(?: to (\d))?", placeholder)
     if not match:
         raise LookupError(f"{{{{{placeholder}}}}} is none of the manual's placeholders")

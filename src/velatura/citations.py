@@ -1,4 +1,4 @@
-"""What to cite for a picture: entries of `references.bib`, which comes with the package, and sources of indices."""
+"""Citations for a picture: entries of `references.bib`, which comes with the package, and sources of indices."""
 
 from __future__ import annotations
 

@@ -35,7 +35,7 @@ SECONDS = 30.0  # of the processor, in which they are read
 
 
 class Budget:
-    """What is left of `LIMITS` and `SECONDS`."""
+    """The rest of `LIMITS` and `SECONDS`."""
 
     def __init__(self) -> None:
         self._left = dict(LIMITS)

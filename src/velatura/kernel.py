@@ -308,7 +308,7 @@ def _register_missing(mi: Any) -> None:
 
 
 def _released(thing: Any) -> None:
-    """What is done with a plugin without references."""
+    """Drop a plugin without references."""
     if exclusive and not sys.is_finalizing():  # both names are None at the very end of Python
         exclusive.drop(thing)
 

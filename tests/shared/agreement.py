@@ -250,13 +250,13 @@ float vt_read(int i, int row) {
 
 
 def textures(made: Shader) -> dict[str, np.ndarray]:
-    """What a shader reads, by name."""
+    """Textures that a shader reads, by name."""
     read = {"vt_tables": made.tables if made.looked_up else None, "vt_baked": made.columns, "vt_films": made.films}
     return {name: data for name, data in read.items() if data is not None}
 
 
 def in_browser(case: Case, recording: Recording | None, made: Shader, browser: Browser) -> tuple[Results, float, float]:
-    """What the shader says, and milliseconds to compile and to draw; a row of pixels for each stack."""
+    """Results of the shader, and milliseconds to compile and to draw; a row of pixels for each stack."""
     called = program(case, recording, made)
     cases = "\n".join(f"        case {j}: result = {answer}; break;" for j, answer in enumerate(called.answers))
     lines = "\n".join(f"    {line}" for line in called.lines)
@@ -278,7 +278,7 @@ void main() {{
 
 
 def on_machine(case: Case, recording: Recording | None, made: Shader, machine: Machine) -> Results:
-    """What the shader says in the language of a machine."""
+    """Results of the shader in the language of a machine."""
     called = program(case, recording, made, machine.printer)
     (answers,) = together([called], made.text, machine, textures(made))
     return called.results(answers)
@@ -391,8 +391,8 @@ def compare(
 
 
 def read_back(stack: Stack, made: Shader, wi: np.ndarray, browser: Browser) -> np.ndarray:
-    """What a shader with parameters reads of the lobes that it has drawn: for each name in `shown`, energies and, but
-    for a base, alphas and rotation, shape (lobes, 6, N)."""
+    """Lobes that a shader with parameters has drawn, as it reads them: for each name in `shown`, energies and, but for
+    a base, alphas and rotation, shape (lobes, 6, N)."""
     values = placed(stack, made)
     uniforms = {f"vt_parameters.{place}": value for place, value in values.items()}
     uniforms["vt_shown[0]"] = [1.0] * len(made.shown)

@@ -106,7 +106,7 @@ class Browser:
         height: int,
         uniforms: Mapping[str, Sequence[float]] | None = None,
     ) -> Drawn:
-        """What a fragment shader writes to a target of floats.
+        """The floats that a fragment shader writes to a target.
 
         Args:
             text: GLSL ES 3.00 with its version.
@@ -130,7 +130,7 @@ class Browser:
 
 
 def missing() -> str:
-    """What must be installed before anything can be drawn, or nothing."""
+    """The tool that must be installed before anything can be drawn, or nothing."""
     try:
         import playwright.sync_api  # noqa: F401
     except ImportError:

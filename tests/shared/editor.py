@@ -216,7 +216,7 @@ def difference(a: np.ndarray, b: np.ndarray) -> float:
 
 
 def unexpected(visits: Iterable[Visit], expected: Iterable[str]) -> list[str]:
-    """What the consoles of pages have complained about, without messages that contain an expected text."""
+    """Complaints of the consoles of pages, without messages that contain an expected text."""
     known = list(expected)
     return [text for found in visits for text in found.complaints if not any(part in text for part in known)]
 

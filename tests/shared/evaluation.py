@@ -1,4 +1,4 @@
-"""What recorded expressions come to, in NumPy."""
+"""Values of recorded expressions, in NumPy."""
 
 from __future__ import annotations
 

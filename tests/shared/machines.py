@@ -89,7 +89,7 @@ class Machine(ABC):
 
     @abstractmethod
     def missing(self) -> str:
-        """What must be installed before anything can run, or nothing."""
+        """The tool that must be installed before anything can run, or nothing."""
 
     @abstractmethod
     def compile(self, text: str) -> None:
@@ -113,7 +113,7 @@ class Machine(ABC):
         bindings: Mapping[str, int] = SLOTS,
         changing: Changing | None = None,
     ) -> np.ndarray:
-        """What a program writes: `size` results for each of so many rows, (count, size, 4).
+        """Results of a program: `size` of them for each of so many rows, (count, size, 4).
 
         Textures are float arrays (height, width, 4) by name; among them `vt_given`, with a row for each. `changing` is
         what a program with uniforms reads.
@@ -201,7 +201,7 @@ class _OnVulkan(Machine):
 
     @abstractmethod
     def code(self, text: str) -> str | bytes:
-        """What the device reads: WGSL or SPIR-V."""
+        """The code that the device reads: WGSL or SPIR-V."""
 
 
 class InWgsl(_OnVulkan):

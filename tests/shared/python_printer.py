@@ -220,7 +220,7 @@ def put(target: Any, place: str, value: Any) -> None:
 
 
 def reader(baked: SolvedLookUp, found: SolvedContents | None = None) -> Callable[[Group, Sequence[Any]], Any]:
-    """What reads a group of texels of a solved material at a place."""
+    """A function that reads a group of texels of a solved material at a place."""
     solved = found or baked.solved
     assert solved is not None
     texture = solved.texels.astype(float)

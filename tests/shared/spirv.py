@@ -1,4 +1,4 @@
-"""What a program in SPIR-V does for one pixel, at most: instructions that compute, and texels that are fetched."""
+"""Work of a program in SPIR-V for one pixel, at most: instructions that compute, and texels that are fetched."""
 
 from __future__ import annotations
 

@@ -57,7 +57,7 @@ _RADIANCE = """
 
 
 def missing() -> str:
-    """What must be installed first, or nothing."""
+    """The tool that must be installed first, or nothing."""
     if not ESBUILD.exists():
         return f"the page's packages are missing: npm ci in {PAGE}"
     return chromium.missing()

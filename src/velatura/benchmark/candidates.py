@@ -1,4 +1,4 @@
-"""What is scored: functions of two directions, BSDFs of Mitsuba, and values from files, as light in bins."""
+"""Candidates for scores: functions of two directions, BSDFs of Mitsuba, and values from files, as light in bins."""
 
 from __future__ import annotations
 
@@ -115,7 +115,7 @@ def asked(case: Case) -> Iterator[None]:
 
 
 def numbers(what: str, given: Any, shape: tuple[int, ...]) -> Array:
-    """What a candidate gives, as numbers of a shape.
+    """The answer of a candidate, as numbers of a shape.
 
     Raises:
         InvalidInput: other types, another shape, or values that are negative, infinite or above BRIGHTEST.

@@ -37,7 +37,7 @@ def chosen_interface(body: Body) -> tuple[Stack, int]:
 
 
 def numbers_of(body: Body) -> dict[str, float]:
-    """What sliders take from the chosen interface: its mean reflectance at normal incidence when smooth, its roughness.
+    """Numbers for sliders of the chosen interface: its mean reflectance at normal incidence when smooth, its roughness.
 
     Raises:
         InvalidInput: as `chosen_interface`, and a texture.

@@ -201,7 +201,7 @@ def _made(task: Callable[[], Made]) -> Made:
 
 
 def _common(refusals: Mapping[Order, str], models: Sequence[Model]) -> dict[str, bytes]:
-    """What does not depend on a material."""
+    """The answers that do not depend on a material."""
     begun = VERBS["session"]({})
     names = [model.name for model in models]
     environments = [{**each, "url": each["url"] and each["url"].lstrip("/")} for each in begun["environments"]]

@@ -99,7 +99,7 @@ def _surface(axes: Any, case: dict[str, Any]) -> None:
 
 
 def _attenuated(energy: float, eta_1: Any) -> Any:
-    """What the lower interface must reflect, its medium included (Bati et al. 2021, Eq. 11)."""
+    """Reflectance that the lower interface must have, its medium included (Bati et al. 2021, Eq. 11)."""
     upper = fresnel.normal_incidence(eta_1)
     return (energy - upper) / (1 + (energy - 2) * upper)
 

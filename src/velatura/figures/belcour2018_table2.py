@@ -92,7 +92,7 @@ def _rendered(name: str, size: int, spp: int, repeats: int, seed: int) -> tuple[
 
 
 def _evaluated(name: str, rounds: int, lanes: int, seed: int) -> evaluation.Costs:
-    """What BSDFs of a scene's material cost over the baseline's, all of them with a texture."""
+    """Costs of BSDFs of a scene's material over the baseline's, all of them with a texture."""
     with tempfile.TemporaryDirectory() as folder:
         stack = evaluation.textured(preset(SCENES[name][0]), Path(folder))
         bsdfs = {column: canvas.bsdf(_for(model, stack), model, **made) for column, (model, made) in COLUMNS.items()}

@@ -78,7 +78,7 @@ def compute(
 
 
 def _made(name: str, case: Case) -> Candidate:
-    """What an entrant makes of a stack; a BSDF of the walk as well."""
+    """The candidate that an entrant makes of a stack; a BSDF of the walk as well."""
     found = made(benchmark.entrant(name)(case))
     return Plugin(api.bsdf(case.stack, "reference")) if isinstance(found, Walk) else found
 

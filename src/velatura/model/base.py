@@ -1,4 +1,4 @@
-"""What every model of a stack says: its lobes, its BSDF, and the choices that a user has."""
+"""The interface of every model of a stack: its lobes, its BSDF, and the choices that a user has."""
 
 from __future__ import annotations
 
@@ -153,8 +153,8 @@ class Model(ABC):
         """The BSDF of a material with constants of a renderer."""
 
     def lit(self, material: Material, wi: Direction) -> Callable[[Any], Body]:
-        """What is reflected of light from directions wi, (M,) each, by a material with values of NumPy: the body for
-        those of given numbers, (N,)."""
+        """Reflection of light from directions wi, (M,) each, by a material with values of NumPy: the body for those of
+        given numbers, (N,)."""
         from velatura.model.context import Context
         from velatura.model.variance import variance_kind
 

@@ -60,14 +60,14 @@ class SmoothInterface(ops.NamedFields):
         return fresnel.dielectric_together(cos2, self.n12, self.eta)
 
     def pass_together(self, cos2: Value) -> Value:
-        """What facets of a dielectric let pass, likewise."""
+        """Transmittance of the facets of a dielectric, likewise."""
         if self.films:
             cos_theta = ops.sqrt(cos2)
             return self.films.passing(cos_theta, fresnel.cos_transmitted(cos_theta, self.n12), self.eta)
         return 1 - self.reflect_together(cos2)
 
     def absorb(self, cos_theta: Value) -> Value:
-        """What films on the facets of a dielectric absorb."""
+        """Absorption by films on the facets of a dielectric."""
         return 1 - self.reflect(cos_theta) - self.pass_together(cos_theta * cos_theta)
 
     def reflect_back(self, cos_theta: Value, cos_t: Value) -> Value:

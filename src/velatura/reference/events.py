@@ -47,7 +47,7 @@ class SurfaceMeeting:
         return False if self.layers.transmits else self.layers.is_base(self.j)
 
     def shares(self, cosine: Value) -> tuple[Value, Value]:
-        """What a facet reflects, and lets pass."""
+        """Reflectance and transmittance of a facet."""
         return self.layers.shares(self.j, cosine, self.n_in, self.n_out, self.above)
 
 

@@ -132,11 +132,11 @@ class WalkedLayers:
         return replace(self, surfaces=surfaces, slabs=slabs, index=index, flipped=where)
 
     def start(self, one: Value) -> Value:
-        """What a path carries at first, in place of a colour of ones."""
+        """Weight of a path at first, in place of a colour of ones."""
         return self.metal.one if self.metal else one
 
     def seen(self, carried: Value, kind: Any) -> Value:
-        """What a path carries as a colour of a renderer's type."""
+        """Weight of a path as a colour of a renderer's type."""
         return self.metal.seen(carried, kind) if self.metal else carried
 
     # Surfaces and slabs -----------------------------------------------------------------------------------------------
@@ -151,7 +151,7 @@ class WalkedLayers:
         return True if self.count == 1 else j == self.count - 1
 
     def shares(self, j: Value, cosine: Value, n_in: Value, n_out: Value, above: Value) -> tuple[Value, Value]:
-        """What a facet of surface j reflects, and lets pass, by Fresnel: colours, for light from the side of index
+        """Fresnel reflectance and transmittance of a facet of surface j: colours, for light from the side of index
         `n_in`, which is the one above where the condition holds.
 
         All colours are refracted into one direction, that of the mean indices; where there is none, none pass.

@@ -27,7 +27,7 @@ class WalkedMetal:
 
     @property
     def one(self) -> Value:
-        """What a path carries at first."""
+        """Weight of a path at first."""
         return self._colour([1.0] * len(self.spectrum.nm))
 
     @cached_property
@@ -53,7 +53,7 @@ class WalkedMetal:
         return self._colour([colour[c] for c in self.spectrum.channel.tolist()]) if is_colour(colour) else colour
 
     def seen(self, carried: Value, kind: Any) -> Value:
-        """What paths carry as a colour of channels, of a renderer's type."""
+        """Weights of paths as a colour of channels, of a renderer's type."""
         found = [0.0] * self.spectrum.channels
         for x, c, weight in zip(carried, self.spectrum.channel.tolist(), self.spectrum.weights.tolist()):
             found[c] = found[c] + weight * x

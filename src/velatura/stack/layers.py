@@ -76,7 +76,7 @@ class InterfaceValues:
 
 
 class SlabValues(ABC):
-    """What lies between two surfaces, as models read it: its optical depths along the normal (colours), and its
+    """A medium between two surfaces, as models read it: its optical depths along the normal (colours), and its
     asymmetry `g`, the mean cosine of the scattering angle. Its phase function is Henyey and Greenstein's of that, or
     else `phase` as written (`velatura.media`).
     """

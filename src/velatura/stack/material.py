@@ -103,7 +103,7 @@ class Material:
         return self._each("measured")
 
     def _each(self, key: str) -> tuple[Any, ...]:
-        """What each layer has beside its values, None for those that are no interfaces."""
+        """An attribute of each layer beside its values, None for those that are no interfaces."""
         return tuple(getattr(layer, key) if isinstance(layer, InterfaceValues) else None for layer in self.layers)
 
     def _with(self, key: str, each: Sequence[Any]) -> Material:

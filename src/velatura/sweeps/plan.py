@@ -75,7 +75,7 @@ class Plan(Space):
 
     @property
     def question(self) -> Question:
-        """What is asked."""
+        """The question."""
         return Question(self.what) if callable(self.what) else QUESTIONS[self.what]
 
     def to_dict(self) -> dict[str, Any]:

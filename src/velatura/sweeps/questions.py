@@ -1,4 +1,4 @@
-"""What a sweep can ask of a stack: named questions, and functions of one's own.
+"""Questions of a sweep to a stack: named ones, and functions of one's own.
 
 An answer holds arrays by name, each with the names of its dimensions: `{"energy": (("interface", "colour"), array)}`.
 """
@@ -155,7 +155,7 @@ def distribution(
 
 
 def check(stack: Stack, seed: int, model: str = DEFAULT, **switches: Any) -> Answer:
-    """What decides each law, as `velatura.check` reports it; NaN for laws that say nothing about the stack."""
+    """Values that decide each law, as `velatura.check` reports them; NaN for laws that say nothing about the stack."""
     from velatura import api
     from velatura.checks import LAWS
 

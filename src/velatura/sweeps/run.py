@@ -127,7 +127,7 @@ def _sound(store: Store) -> set[int]:
 
 
 def _looked(runs: Engine, packed: bytes, plan: Plan) -> Layout:
-    """What is found at every point, as one of the first shows it."""
+    """The layout of what is found at every point, as one of the first shows it."""
     why, tried = "", min(TRIED, math.prod(plan.shape))
     for number in range(tried):
         answer = _alone(runs, packed, number)
@@ -139,7 +139,7 @@ def _looked(runs: Engine, packed: bytes, plan: Plan) -> Layout:
 
 
 def _alone(runs: Engine, packed: bytes, number: int) -> work.Answered:
-    """What a point gives that may end its process; one that ends while others begin is asked again."""
+    """The answer of a point that may end its process; one that ends while others begin is asked again."""
     for _ in range(ATTEMPTS):
         try:
             (answer,) = runs.result(runs.submit(work.look, packed, (number,)))

@@ -55,7 +55,7 @@ class StoredVariable:
 
     @classmethod
     def of(cls, dims: tuple[str, ...], array: Array) -> StoredVariable:
-        """What one point gave."""
+        """The variable of which one point gave an array."""
         return cls(dims, array.shape, array.dtype.str)
 
     @classmethod

@@ -1,4 +1,4 @@
-"""What a worker does: it looks at points, one after another, and writes chunks of them."""
+"""The work of a worker: it looks at points, one after another, and writes chunks of them."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ Answered = Mapping[str, tuple[tuple[str, ...], Array]] | str
 
 @dataclass(frozen=True)
 class Job:
-    """What every worker is given, once.
+    """The task that every worker is given once.
 
     Args:
         path: the store; layout: what is found at every point, None as long as it is not known.
@@ -72,7 +72,7 @@ def _unpacked(packed: bytes) -> Job:
 
 
 def look(packed: bytes, numbers: Sequence[int]) -> list[Answered]:
-    """What points give."""
+    """The answers of points."""
     job = _unpacked(packed)
     plan, ask = job.plan, job.plan.question.ask
     kernel.use_threads(1)  # workers share the machine, and sums of several threads are rounded by chance
@@ -129,7 +129,7 @@ def _fitting(answer: Answered, layout: Layout) -> Mapping[str, Array] | str:
 
 
 def _named(found: Any) -> dict[str, tuple[tuple[str, ...], Array]]:
-    """What a question answered, checked, with names for dimensions that have none."""
+    """The answer of a question, checked, with names for dimensions that have none."""
     if not isinstance(found, Mapping) or not found:
         raise InvalidInput(f"what: must return arrays by name, got {type(found).__name__}")
     return {str(name): _array(str(name), value) for name, value in found.items()}

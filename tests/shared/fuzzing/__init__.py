@@ -16,7 +16,7 @@ Trial = Callable[[np.random.Generator], "list[Failure]"]
 
 @dataclass(frozen=True)
 class Failure:
-    """What was wrong with one input.
+    """A failure on one input.
 
     Args:
         kind: in a word or two, the same for all that failed alike.

@@ -55,7 +55,7 @@ class Sampled:
 
 
 class Disguised:
-    """What fails as an array."""
+    """An object that fails as an array."""
 
     def __array__(self, *_: Any, **__: Any) -> Any:
         raise TypeError("no array\nat all")
@@ -115,7 +115,7 @@ def trial(rng: np.random.Generator) -> list[Failure]:
 
 
 def scored(name: str, number: int) -> list[Failure]:
-    """What is wrong with the answer to a function, at one stack of a kind."""
+    """Failures of the answer to a function, at one stack of a kind."""
     candidate, refused = FUNCTIONS[name]
     cases = [case for case in benchmark.edition() if case.kind == KIND]
     at, before = cases[number % len(cases)], _state()

@@ -156,7 +156,7 @@ def _change(line: list[str], rng: np.random.Generator) -> None:
 def tried(
     line: list[str], inputs: dict[str, str], environment: dict[str, str] | None = None, redirection: str = ""
 ) -> list[Failure]:
-    """What is wrong with how a command line ends, in a folder with these files; in this process unless an environment
+    """Failures of how a command line ends, in a folder with these files; in this process unless an environment
     is given."""
     case: dict[str, Any] = {"line": line, **{k: v for k, v in inputs.items() if v != INPUTS[k]}}
     if environment is not None:

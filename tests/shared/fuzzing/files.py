@@ -55,7 +55,7 @@ def trial(rng: np.random.Generator) -> list[Failure]:
 
 
 def tried(data: bytes, ending: str) -> list[Failure]:
-    """What is wrong with how a file of this content is read."""
+    """Failures of how a file of this content is read."""
     case = {"ending": ending, "content": data}
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder, "material" + ending)
@@ -79,7 +79,7 @@ def tried(data: bytes, ending: str) -> list[Failure]:
 
 
 def _read(path: Path) -> tuple[str, str] | None:
-    """What is wrong with a file that is accepted: what is written of it must be read as the same."""
+    """The fault of a file that is accepted: what is written of it must be read as the same."""
     stack = vt.load(path)
     for written in ("yaml", "json"):
         if loads(dumps(stack, written), f"again.{written}") != stack:

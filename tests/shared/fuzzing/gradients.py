@@ -34,7 +34,7 @@ def trial(rng: np.random.Generator) -> list[Failure]:
 
 
 def tried(stack: vt.Stack, rng: np.random.Generator) -> list[Failure]:
-    """What is wrong with the gradients of a stack."""
+    """Failures of the gradients of a stack."""
     case = {"material": stack.to_dict()}
     try:
         return [Failure(kind, detail, case) for kind, detail in _found(stack, rng)]
@@ -90,7 +90,7 @@ def _found(stack: vt.Stack, rng: np.random.Generator) -> list[tuple[str, str]]:
 def judged(
     at: Address, gradient: float, light: Callable[[float], float], ends: tuple[float, float], whole: float
 ) -> Iterator[tuple[str, str]]:
-    """What is wrong with a gradient by the scale of a value, and with the light between two scales.
+    """Faults of a gradient by the scale of a value, and of the light between two scales.
 
     Where it is no difference, light may be curved or have a kink: a gradient is between the slopes of both sides, over
     the step and half of it. Or light jumps, which is an error of its own: of a change a share stays over a small step.

@@ -43,7 +43,7 @@ def material(name: str) -> dict[str, Any]:
 
 
 def fragment(name: str, **others: Any) -> str:
-    """What follows an address to open a material of a name, maybe with other parts of the state."""
+    """The end of an address that opens a material of a name, maybe with other parts of the state."""
     text = json.dumps({"material": material(name), "model": "belcour2018", **others})
     packed = zlib.compressobj(wbits=-15)
     data = packed.compress(text.encode()) + packed.flush()

@@ -78,7 +78,7 @@ def trial(rng: np.random.Generator) -> list[Failure]:
 
 
 def tried(kind: str, files: Files, read: Callable[[Path], Wrong]) -> list[Failure]:
-    """What is wrong with how the first of some files is read."""
+    """Failures of how the first of some files is read."""
     case = {"kind": kind, **files}
     with tempfile.TemporaryDirectory() as folder:
         for name, data in files.items():

@@ -36,7 +36,7 @@ def trial(rng: np.random.Generator) -> list[Failure]:
 
 
 def tried(stack: vt.Stack, model: Model, rng: np.random.Generator, continuous: bool = True) -> list[Failure]:
-    """What is wrong with the lobes of a stack."""
+    """Failures of the lobes of a stack."""
     case: dict[str, Any] = {**described(model), "material": stack.to_dict()}
     phi = rng.uniform(-np.pi, np.pi, len(COSINES))
     try:

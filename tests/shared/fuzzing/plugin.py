@@ -38,7 +38,7 @@ def trial(rng: np.random.Generator) -> list[Failure]:
 
 
 def tried(stack: vt.Stack, model: Model, rng: np.random.Generator) -> list[Failure]:
-    """What is wrong with the BSDF of a stack."""
+    """Failures of the BSDF of a stack."""
     case = {**described(model), "material": stack.to_dict()}
     try:
         return [Failure(kind, detail, case) for kind, detail in _found(vt.bsdf(stack, model), rng)]

@@ -28,7 +28,7 @@ def trial(rng: np.random.Generator) -> list[Failure]:
 
 
 def tried(stack: vt.Stack, model: Model, rng: np.random.Generator) -> list[Failure]:
-    """What is wrong with the BSDF of a stack in `scalar_rgb`."""
+    """Failures of the BSDF of a stack in `scalar_rgb`."""
     case: dict[str, Any] = {**described(model), "material": stack.to_dict()}
     before = kernel.mitsuba().variant()
     try:

@@ -102,7 +102,7 @@ class _Tame:
         self.rng = rng
 
     def accepted(self, make: Callable[[], Any]) -> Any:
-        """What is made of values that are drawn until they are accepted."""
+        """A result of values that are drawn until they are accepted."""
         while True:
             try:
                 return make()

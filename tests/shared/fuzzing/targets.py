@@ -72,7 +72,7 @@ def _entries(key: str, interfaces: int, rng: np.random.Generator) -> list[Any]:
 
 
 def tried(text: str, model: str = "", more: bool = False) -> list[Failure]:
-    """What is wrong with how a target file of this content is read, and, if a model is given, inverted."""
+    """Failures of how a target file of this content is read, and, if a model is given, inverted."""
     case = {"content": text, "model": model}
     start = time.process_time()
     with tempfile.TemporaryDirectory() as folder:
@@ -96,7 +96,7 @@ def _again(target: Target) -> tuple[str, str] | None:
 
 
 def _inverted(target: Target, model: str, more: bool) -> tuple[str, str] | None:
-    """What is wrong with the stacks of a target, or with its refusal."""
+    """The fault of the stacks of a target, or of its refusal."""
     try:
         found = alternatives(target, 3, model) if more else [invert_stack(target, model)]
     except Infeasible as error:

@@ -22,7 +22,7 @@ def trial(rng: np.random.Generator) -> list[Failure]:
 
 
 def tried(verb: str, rng: np.random.Generator) -> list[Failure]:
-    """What is wrong with how a random wish of a kind ends."""
+    """Failures of how a random wish of a kind ends."""
     words, inputs = WISHES[verb](rng)
     if rng.random() < 0.5:
         words += ["--model", str(rng.choice([model.name for model in MODELS]))]

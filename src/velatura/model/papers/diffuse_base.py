@@ -242,7 +242,7 @@ class _Films:
         return cls(found, films, eta, n12, alpha) if above else cls(found, films.reversed(), 1 / eta, 1 / n12, alpha)
 
     def more(self, n: Value) -> Row:
-        """What passes of the light of each node of a medium of index n, over that without films."""
+        """Share that passes of the light of each node of a medium of index n, over that without films."""
         with_films = self._means(n, self._passing)
         without = self._means(n, lambda c: 1 - fresnel.dielectric_between(c, self._beyond(c), self.eta))
         return [
@@ -251,7 +251,7 @@ class _Films:
         ]
 
     def lost(self, n: Value) -> Row:
-        """What films absorb of the light of each node of a medium of index n."""
+        """Share that films absorb of the light of each node of a medium of index n."""
         absorbed = self._means(n, lambda c: 1 - self.films.between(c, self._beyond(c), self.eta) - self._passing(c))
         return [ops.clip(x, 0.0, 1.0) for x in absorbed]
 
@@ -275,7 +275,7 @@ def _by_films(passing: Sequence[Row], films: _Films | None, n: Value) -> Sequenc
 
 
 def _gone(leaving: Row, films: _Films | None, n: Value, absorbs: bool) -> Row:
-    """What leaves a medium of index n through an interface, and what is absorbed there."""
+    """Light that leaves a medium of index n through an interface, and that is absorbed there."""
     return _added(leaving, films.lost(n)) if films and absorbs else leaving
 
 

@@ -170,7 +170,7 @@ class _Averages:
         return self._of(row)
 
     def absorbed(self, facets: SmoothInterface) -> Average | None:
-        """What films of a dielectric absorb, by the cosine and the roughness."""
+        """Absorption by films of a dielectric, by the cosine and the roughness."""
         films, multiple = facets.films, self.model.microsurface
         if facets.opaque or films is None or not absorbs(films):
             return None

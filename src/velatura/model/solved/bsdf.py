@@ -111,11 +111,11 @@ class Side:
         return list(map(value, columns))
 
     def seen(self, w: Direction) -> SideView:
-        """What light from a direction above sees."""
+        """The side as light from a direction above sees it."""
         return self.given(w, self.at(w))
 
     def part(self, k: int, w: Direction) -> SideView:
-        """What light from a direction above sees of the reflected part of number k alone, which is the first one. In
+        """The view from a direction above with the reflected part of number k alone, which is the first one. In
         NumPy."""
         weight, *others = self._only(w, self.declaration.part(k))
         roughness, beyond = (others, []) if k < len(self.shapes) else ([], others)
@@ -124,7 +124,7 @@ class Side:
         return replace(self, shapes=self.shapes[k : k + 1]).given(w, columns)
 
     def through(self, w: Direction) -> SideView:
-        """What light from a direction above sees of all that passes. In NumPy."""
+        """The view from a direction above with what passes alone. In NumPy."""
         found, count = self._only(w, self.declaration.through), len(self.declaration.parts)
         columns = Columns([], [], [], [], 0.0, 0.0, 0.0, Parts(*found[:count]), None, wide_passed=found[count:])
         return replace(self, shapes=(), top=None).given(w, columns)
@@ -136,7 +136,7 @@ class Side:
         return self._values([columns[k] for k in chosen], self.curves.only(rows)(w))
 
     def given(self, w: Direction, columns: Columns) -> SideView:
-        """What light from a direction above sees, by the columns for it."""
+        """The view from a direction above, by the columns for it."""
         every = zip(self.shapes, columns.weights, columns.roughness)
         lobes = [shape.lobe(weight, self.kind(*numbers).roughness(ROOTS)) for shape, weight, numbers in every]
         # The axes of isotropic interfaces lie in the plane of incidence
@@ -284,7 +284,7 @@ class Solved:
         return replace(self, known=self.seen(wi))
 
     def seen(self, wi: Direction) -> tuple[SideView, Value]:
-        """What light from wi sees, turned up; the index of the medium beyond over that on its own side."""
+        """The view from wi, turned up; the index of the medium beyond over that on its own side."""
         if self.known:
             return self.known
         if self.below is None:

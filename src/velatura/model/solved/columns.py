@@ -1,4 +1,4 @@
-"""What depends on direction in a solved material, declared once: the order, the kinds and the rows of its columns."""
+"""Columns over direction of a solved material, declared once: their order, their kinds and their rows."""
 
 from __future__ import annotations
 

@@ -23,7 +23,7 @@ Array = NDArray[np.floating]
 
 
 class Demand(NamedTuple):
-    """What K parts need for N directions, (K, N) each, or (N,) of one part: their energies, and where a part takes all
+    """Needs of K parts for N directions, (K, N) each, or (N,) of one part: their energies, and where a part takes all
     samples, the mean weight of these over the light that they carry, and the largest one."""
 
     energy: Array

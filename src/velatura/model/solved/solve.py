@@ -150,7 +150,7 @@ class Lit:
         return Solved(self.side, None, 1.0, False, (self.view(which)[0], 1.0))
 
     def view(self, which: NDArray[np.integer]) -> tuple[SideView, Direction]:
-        """What light from the directions of numbers `which` sees, and these."""
+        """The view from the directions of numbers `which`, and these."""
 
         def taken(value: Any) -> Any:
             if isinstance(value, (list, tuple)):
@@ -345,7 +345,7 @@ class Solver:
         return kind.of(layer, self.phase_of(layer), shares)
 
     def transmission(self, material: Material, layout: Layout) -> Transmission | None:
-        """What passes a material, but for what a medium alone scatters; None where nothing does."""
+        """Transmission of a material, but for what a medium alone scatters; None where nothing passes."""
         if not material.transmits:
             return None
         return direct.transmission(material, self.variance, layout.stepped, layout.rough, layout.cloudy)

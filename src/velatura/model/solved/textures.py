@@ -95,7 +95,7 @@ class Turning:
 
 @dataclass(frozen=True)
 class Term:
-    """What some axes change: tables over direction and them, for either side, and of the remainder over them. The first
+    """Change by some axes: tables over direction and them, for either side, and of the remainder over them. The first
     term has the columns themselves, a further one by what it scales those of the first, or `adds` to them."""
 
     axes: tuple[TextureAxis | Wavelengths, ...]

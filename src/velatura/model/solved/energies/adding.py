@@ -110,7 +110,7 @@ class Leaving:
         return Sorted(reflected, light.columns, straight.columns)
 
     def _outward(self, out: Leaver) -> Iterator[Leaver]:
-        """What becomes of light that each layer but the first reflects, given that of light from below the first."""
+        """Light that each layer but the first reflects, as it leaves, given that of light from below the first."""
         for each, below, bounces in zip(self.stack[1:], self.below, self.bounces):
             yield out
             # model.md, Eq. 3: (1 - R below)^-1 is 1 + R (1 - below R)^-1 below
@@ -118,7 +118,7 @@ class Leaving:
 
 
 def layers(found: Sequence[Part], setting: Setting) -> list[tuple[Layer, Layer]]:
-    """What each layer does to light, where facets are met once, and as the setting says."""
+    """Operators of each layer, where facets are met once, and as the setting says."""
     return [layer(part, of) for part, of in zip(found, settings(found, setting))]
 
 

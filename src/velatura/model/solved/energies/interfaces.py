@@ -56,7 +56,7 @@ class Setting:
         return self.basis, self.samples, self.often, self.events, self.p.tobytes(), self.phi.tobytes()
 
     def kept(self, key: Hashable, make: Callable[[], T]) -> T:
-        """What is made of light in this basis, but for the ends of its nodes, once for all of one key."""
+        """A result for light in this basis, regardless of the ends of its nodes, made once for all of one key."""
         return KEPT.once((key, type(self.basis), self.basis.deposits, self.samples, self.often), make)
 
     @property
@@ -193,9 +193,9 @@ class _Met:
 
 @dataclass(frozen=True)
 class _Side:
-    """What becomes of light from one side of an interface at first events, with facets met once, and as the setting
-    says; what the latter block, that in the end is reflected, and that passes; and of brushed interfaces both with the
-    directions of `second` events.
+    """Light from one side of an interface after first events, with facets met once, and as the setting says; what the
+    latter block, that in the end is reflected, and that passes; and of brushed interfaces both with the directions of
+    `second` events.
     """
 
     r: tuple[Operator, Operator]

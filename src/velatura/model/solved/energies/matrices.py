@@ -82,7 +82,7 @@ def product(first: Matrix, second: Matrix) -> Matrix:
 
 
 def applied(matrix: Matrix, columns: Array) -> Array:
-    """What a matrix makes of columns (C, F, n, M)."""
+    """A matrix times columns (C, F, n, M)."""
     if not isinstance(matrix, Blocks):
         return _dense(matrix, columns)
     each = columns.reshape(*columns.shape[:2], matrix.count, matrix.width, columns.shape[-1])

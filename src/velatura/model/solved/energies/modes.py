@@ -122,7 +122,7 @@ class Basis(ABC):
 
     @abstractmethod
     def columns(self, light: Array, rotation: float) -> Array:
-        """What becomes of single directions, (C, families, n, M), as deposited."""
+        """Light of single directions, (C, families, n, M), as deposited."""
 
     @abstractmethod
     def rows(self, values: Array, rotation: float) -> Array:

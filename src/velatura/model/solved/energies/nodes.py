@@ -96,9 +96,9 @@ class Nodes:
 
     @cached_property
     def numbers(self) -> list[float]:
-        """What `stencil` reads: the inner ends, and of each part the square of its beginning, the inverse of its length
-        in squares, its cells for each radian, its last cell, the first and the last one that a stencil begins at, and
-        the number of its first node."""
+        """Numbers for `stencil`: the inner ends, and of each part the square of its beginning, the inverse of its
+        length in squares, its cells for each radian, its last cell, the first and the last one that a stencil begins
+        at, and the number of its first node."""
         squares, cells = np.square(self.ends), np.array(self.cells, float)
         lowest = np.r_[-1, np.zeros(len(cells) - 1)]
         before = np.r_[0, np.cumsum(cells)[:-1]]

@@ -57,7 +57,7 @@ class Operator:
 
     @property
     def light(self) -> Operator:
-        """What becomes of beams alone."""
+        """The operator on beams alone."""
         return replace(self, nodes=self.columns[..., :0])
 
     def __matmul__(self, first: Operator) -> Operator:
@@ -120,7 +120,7 @@ def _joined(outcomes: Sequence[Array]) -> Array:
 
 @dataclass(frozen=True)
 class Layer:
-    """What a layer, or a stack of layers, does to light from above (`r`, `t`) and to light from below."""
+    """Operators of a layer, or of a stack of layers, on light from above (`r`, `t`) and on light from below."""
 
     r: Operator
     t: Operator

@@ -26,7 +26,7 @@ WAVELENGTHS = 2  # of a channel
 
 @dataclass(frozen=True)
 class Colours:
-    """What colours are solved for: the channels of a material, or the wavelengths of its `metal`, relative to the
+    """Colours that are solved for: the channels of a material, or the wavelengths of its `metal`, relative to the
     outside above."""
 
     metal: MetalWavelengths | None = None

@@ -153,7 +153,7 @@ class ScatteredThrough(ops.NamedFields):
 
 @dataclass(frozen=True)
 class PassedSamples:
-    """What a medium alone passes with events, from one direction, and samples of it; directions below are turned up."""
+    """Light from one direction that a medium alone passes with events, and its samples; those below are turned up."""
 
     light: ScatteredThrough
     samples: TopSamples

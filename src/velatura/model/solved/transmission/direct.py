@@ -92,13 +92,13 @@ class Refraction(ops.NamedFields):
     films: Films | None = None
 
     def passing(self, cos_1: Value, cos_2: Value) -> Value:
-        """What facets let pass (a colour) for cosines above and below, by Fresnel."""
+        """Transmittance of facets (a colour) for cosines above and below, by Fresnel."""
         return dielectric_passing(self.films, cos_1, cos_2, self.eta)
 
 
 @dataclass(frozen=True)
 class CrossedSlab(ops.NamedFields):
-    """What lies between two interfaces: optical depths along the normal (colours), in all and for scattering, and the
+    """Media between two interfaces: optical depths along the normal (colours), in all and for scattering, and the
     asymmetry g."""
 
     depth: Value = 0.0
@@ -469,7 +469,7 @@ def _refracted(
 
 
 def _chosen(refractions: Sequence[Refraction], eta: Value, u: Value, begins: Sequence[Value]) -> Passing:
-    """What the facets of the interface of relative index `eta` let pass that u has chosen, by where each begins."""
+    """Transmittance of the interface of relative index `eta` that u has chosen, by where each begins."""
     if not any(refraction.films for refraction in refractions):
         return lambda cos_1, cos_2: 1 - fresnel.dielectric_between(cos_1, cos_2, eta)
 

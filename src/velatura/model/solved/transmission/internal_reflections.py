@@ -96,7 +96,7 @@ def bound(transmission: Transmission) -> Value:
 
 @dataclass(frozen=True)
 class EitherRest:
-    """What a medium alone passes where a condition holds, else the light of other materials."""
+    """Light that a medium alone passes where a condition holds, else that of other materials."""
 
     where: Value
     alone: PassedSamples
