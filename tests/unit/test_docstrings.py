@@ -11,9 +11,11 @@ import pytest
 ROOT = Path(__file__).parents[2]
 PLACES = ("src/velatura", "benchmarks", "tests/shared", "tools")
 DOCUMENTED = ast.Module | ast.ClassDef | ast.FunctionDef | ast.AsyncFunctionDef
-PREPOSITIONS = {
+# Prepositions, and a relative pronoun without its noun
+HEADLESS = {
     *("about", "above", "after", "along", "among", "as", "at", "before", "below", "beside", "between", "by", "for"),
     *("from", "in", "into", "of", "on", "over", "per", "through", "to", "towards", "under", "until", "with", "without"),
+    "what",
 }
 
 
@@ -25,7 +27,7 @@ def docstrings(path: Path) -> Iterator[tuple[int, str]]:
 
 
 @pytest.mark.parametrize("place", PLACES)
-def test_a_docstring_does_not_begin_with_a_preposition(place: str) -> None:
+def test_a_docstring_begins_with_a_noun_or_a_verb(place: str) -> None:
     """Rationale: CONTRIBUTING, "Style of the text". Expected: the first line says what is returned or done."""
     files = [path for path in sorted((ROOT / place).rglob("*.py")) if "node_modules" not in path.parts]
     assert files
@@ -33,6 +35,6 @@ def test_a_docstring_does_not_begin_with_a_preposition(place: str) -> None:
         f"{path.relative_to(ROOT)}:{line}: {text.splitlines()[0]}"
         for path in files
         for line, text in docstrings(path)
-        if text.split()[0].strip(",.:").lower() in PREPOSITIONS
+        if text.split()[0].strip(",.:").lower() in HEADLESS
     ]
     assert not headless, "\n".join(headless)

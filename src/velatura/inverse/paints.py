@@ -472,7 +472,7 @@ class _Seen:
         return np.asarray(self.weights @ reflected)
 
     def difference(self, reflected: Array) -> Array:
-        """What is reflected less the wish, in units of colour difference."""
+        """Reflected light less the wish, in units of colour difference."""
         if self.spectral:
             return SPECTRAL * (reflected - self.wished) / np.sqrt(len(self.wished))
         return lab(self.rgb(reflected)) - lab(self.wished)

@@ -52,7 +52,7 @@ class Deposit(NamedTuple):
 
 
 class Found(NamedTuple):
-    """What a function has for sources and samples: values that are summed up over the samples, values of which the
+    """Results of a function for sources and samples: values that are summed up over the samples, values of which the
     largest is wanted, and light that falls on rows."""
 
     sums: Sequence[Value] = ()
@@ -76,7 +76,7 @@ def over(
     rows: int = 0,
     kind: Hashable = (),
 ) -> tuple[Array, Array, list[Array]]:
-    """What a function finds for each source (S,) over all samples (N,), or its own (S, N): sums (L, S), the largest
+    """Results of a function for each source (S,) over all samples (N,), or its own (S, N): sums (L, S), the largest
     (G, S), and of each light what falls on `rows`, and on the one beyond: (values, waves, rows + 1, S).
 
     `numbers` are a list, a tuple or a record: of others, of numbers, and of colours (3, 1, ...). What is no number, and
@@ -126,7 +126,7 @@ def _rows(each: Sequence[Array], width: int) -> Array:
 
 
 def _deposited(light: Deposit, shape: tuple[int, int], rows: int) -> Array:
-    """What falls on rows, samples being columns of a sparse matrix."""
+    """Light that falls on rows, samples being columns of a sparse matrix."""
     shares, values, waves = (
         np.stack(np.broadcast_arrays(*each, np.empty(shape))[:-1], axis=-1)
         for each in (light.shares, light.values, light.waves)
