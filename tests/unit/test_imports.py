@@ -52,6 +52,10 @@ MAY_IMPORT = {
     "figures": "stack optics ops films model inverse reference checks scenes comparison benchmark api kernel",
 }
 
+# Room of the default model -> those of its rooms that it may import, which do not import it.
+MODEL_ROOMS = {"energies": "", "lobes": "energies", "transmission": "energies lobes"}
+BELOW_ROOMS = {"guards", "sample_allocation"}  # files that all of them may import
+
 # The ends of the stream -> who may import them.
 IMPORTED_BY = {
     "benchmark": "__init__ cli figures",
@@ -189,6 +193,14 @@ def test_the_rooms_of_the_models_know_no_other_room() -> None:
         if f"{name}.".startswith(f"velatura.model.{room}.") and SOURCE / "model" / room not in path.parents
     ]
     assert len(rooms) > 1 and not offences
+
+
+@pytest.mark.parametrize("room", MODEL_ROOMS)
+def test_the_rooms_of_the_default_model_stand_on_each_other(room: str) -> None:
+    allowed = {room, *MODEL_ROOMS[room].split(), *BELOW_ROOMS}
+    files = sorted((SOURCE / "model" / "solved" / room).glob("*.py"))
+    names = {name for path in files for name, _ in imports(path) if name.startswith("velatura.model.solved.")}
+    assert files and {name.split(".")[3] for name in names} <= allowed
 
 
 @pytest.mark.parametrize("library", RENDERER)

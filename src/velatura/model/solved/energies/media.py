@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
-from math import pi
+from math import factorial, pi, sqrt
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,8 +16,14 @@ from velatura.model.rough_interface import Light, colours
 from velatura.model.solved.energies.interfaces import Setting, scaled
 from velatura.model.solved.energies.modes import Basis
 from velatura.model.solved.energies.operators import Layer, Operator
-from velatura.model.solved.guards import BELOW_ONE, COS_IN_MEDIA_MIN, G_MAX, SIN_IN_MEDIA_MAX, TINY
-from velatura.model.solved.lobes import top_medium
+from velatura.model.solved.guards import (
+    BELOW_ONE,
+    COS_IN_MEDIA_MIN,
+    COS_OF_DIRECTIONS_MIN,
+    G_MAX,
+    SIN_IN_MEDIA_MAX,
+    TINY,
+)
 from velatura.ops import Value
 from velatura.optics.ggx import Direction
 from velatura.optics.phase import HenyeyGreenstein, PhaseFunction, deflect
@@ -34,6 +40,9 @@ EVENTS = 600
 FINE_EVENTS = 1597  # where the shape of light counts, and of these
 EVEN = 0.4  # in all directions alike, where few are drawn by a phase function with a peak
 HORIZON = 0.005  # cosine of directions that lie on both sides in part
+ORDERS = 2, 4  # numbers of events that are known in closed form, beside one
+NEAR = 1.0  # difference of two depths, within which a mean over it is by quadrature
+GAUSS = (0.5 - sqrt(0.15), 5 / 18), (0.5, 8 / 18), (0.5 + sqrt(0.15), 5 / 18)  # nodes and weights
 
 
 @dataclass(frozen=True)
@@ -146,7 +155,7 @@ def _deflected(p: Value, psi: Value, cosine: Value, u_2: Value, n: Value) -> Dir
 def escaped(phase: PhaseFunction, depth: Array, basis: Basis, p: Array, through: int | None = None) -> list[Array]:
     """Light (C, modes, N, S) that a medium of an optical depth (C,) scatters back once by a phase function, without
     loss in an event, of one unit from outside of momenta p (S,); and what it passes so, of the number of events that
-    `top_medium.passing` has in the place `through`, None for nothing."""
+    `passing` has in the place `through`, None for nothing."""
 
     def escapes(
         sources: Sequence[Value], samples: Sequence[Value], depths: Sequence[Value]
@@ -154,11 +163,56 @@ def escaped(phase: PhaseFunction, depth: Array, basis: Basis, p: Array, through:
         (p, psi), (cosine, u_2, share) = sources, samples
         x, y, z = _deflected(p, psi, cosine, u_2, 1.0)
         up, down, z_i = ops.maximum(-1 * z, 0.0), ops.maximum(z, 0.0), ops.sqrt(1 - p * p)
-        lights = [Light(x, y, [share * up * top_medium.escaping(depth, z_i, up) for depth in depths])]
+        lights = [Light(x, y, [share * up * escaping(depth, z_i, up) for depth in depths])]
         if through is not None:
-            passing = (top_medium.passing(depth, z_i, down)[through] for depth in depths)
-            lights.append(Light(x, y, [share * down * light for light in passing]))
+            lights.append(Light(x, y, [share * down * passing(depth, z_i, down)[through] for depth in depths]))
         return lights, []
 
     lattice, numbers = _lattice(phase, True), Varying(depth.tolist())
     return basis.deposited(escapes, p, np.zeros_like(p), lattice, numbers, (escaped, through))[0]
+
+
+# Few events, in closed form
+
+
+def power(x: Value, n: int) -> Value:
+    """A whole power of a number of any sign."""
+    found: Value = 1.0
+    for k in range(n):
+        found = found * x if k else x
+    return found
+
+
+def escaping(depth: Value, z_i: Value, z_o: Value) -> Value:
+    """Light that passes a medium to a place and back, (1 - exp(-tau (1 / z_i + 1 / z_o))) / (z_i + z_o)."""
+    z_i, z_o = (ops.maximum(z, COS_OF_DIRECTIONS_MIN) for z in (z_i, z_o))
+    return (1 - ops.exp(-depth * (1 / z_i + 1 / z_o))) / (z_i + z_o)
+
+
+def passing(depth: Value, z_i: Value, z_o: Value) -> list[Value]:
+    """Light that passes a medium with one event, and with each number of `ORDERS`,
+    (P_n(tau / z_o) - P_n(tau / z_i)) / (n (z_i - z_o))."""
+    z_i, z_o = (ops.maximum(z, COS_OF_DIRECTIONS_MIN) for z in (z_i, z_o))
+    counts, x_i, x_o = (1, *ORDERS), depth / z_i, depth / z_o
+    # Where both are alike, by the mean over the depths between, of exp(-x) x^(n-1) / (n-1)!
+    near = ops.absolute(ops.mean(depth) * (z_i - z_o)) < NEAR * z_i * z_o
+    between = [(weight, x_o + u * (x_i - x_o)) for u, weight in GAUSS]
+    kept = [(weight * ops.exp(-x), x) for weight, x in between]
+    alike = depth / (z_i * z_o)
+    apart = 1 / ops.select(near, 1.0, z_i - z_o)
+    lost_i, lost_o = (ops.exp(-x) for x in (x_i, x_o))
+    found = []
+    for n in counts:
+        first, *others = (light * power(x, n - 1) for light, x in kept)
+        mean = sum(others, first) * (1 / factorial(n - 1))
+        difference = lost_i * _exponential(x_i, n) - lost_o * _exponential(x_o, n)
+        found.append(ops.select(near, alike * mean, apart * difference) * (1 / n))
+    return found
+
+
+def _exponential(x: Value, terms: int) -> Value:
+    """The first terms of the series of exp(x)."""
+    total: Value = 1.0
+    for k in range(terms - 1, 0, -1):
+        total = 1 + total * x * (1 / k)
+    return total

@@ -22,14 +22,14 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from math import factorial, pi, sqrt
+from math import pi
 from typing import TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
 from velatura import ops
-from velatura.model.solved.guards import COS_OF_DIRECTIONS_MIN
+from velatura.model.solved.energies.media import ORDERS, escaping, passing, power
 from velatura.model.solved.lobes.remainder import Remainder, RemainderSamples, grazing
 from velatura.ops import Value
 from velatura.optics import ggx
@@ -40,9 +40,6 @@ from velatura.stack import SlabValues
 Array = NDArray[np.floating]
 Medium = TypeVar("Medium", bound="TopMedium")
 
-ORDERS = 2, 4  # powers of the asymmetry
-NEAR = 1.0  # difference of two depths, within which a mean over it is by quadrature
-GAUSS = (0.5 - sqrt(0.15), 5 / 18), (0.5, 8 / 18), (0.5 + sqrt(0.15), 5 / 18)  # nodes and weights
 MOST = 0.8  # of the samples of the remainder that are drawn by phase functions
 
 
@@ -171,49 +168,6 @@ class PassedSamples:
 
     def sample(self, i: Direction, u: Value, u1: Value, u2: Value) -> Direction:
         return self.samples.sample(i, u, u1, u2)
-
-
-def power(x: Value, n: int) -> Value:
-    """A whole power of a number of any sign."""
-    found: Value = 1.0
-    for k in range(n):
-        found = found * x if k else x
-    return found
-
-
-def escaping(depth: Value, z_i: Value, z_o: Value) -> Value:
-    """Light that passes a medium to a place and back, (1 - exp(-tau (1 / z_i + 1 / z_o))) / (z_i + z_o)."""
-    z_i, z_o = (ops.maximum(z, COS_OF_DIRECTIONS_MIN) for z in (z_i, z_o))
-    return (1 - ops.exp(-depth * (1 / z_i + 1 / z_o))) / (z_i + z_o)
-
-
-def passing(depth: Value, z_i: Value, z_o: Value) -> list[Value]:
-    """Light that passes a medium with one event, and with each number of `ORDERS`,
-    (P_n(tau / z_o) - P_n(tau / z_i)) / (n (z_i - z_o))."""
-    z_i, z_o = (ops.maximum(z, COS_OF_DIRECTIONS_MIN) for z in (z_i, z_o))
-    counts, x_i, x_o = (1, *ORDERS), depth / z_i, depth / z_o
-    # Where both are alike, by the mean over the depths between, of exp(-x) x^(n-1) / (n-1)!
-    near = ops.absolute(ops.mean(depth) * (z_i - z_o)) < NEAR * z_i * z_o
-    between = [(weight, x_o + u * (x_i - x_o)) for u, weight in GAUSS]
-    kept = [(weight * ops.exp(-x), x) for weight, x in between]
-    alike = depth / (z_i * z_o)
-    apart = 1 / ops.select(near, 1.0, z_i - z_o)
-    lost_i, lost_o = (ops.exp(-x) for x in (x_i, x_o))
-    found = []
-    for n in counts:
-        first, *others = (light * power(x, n - 1) for light, x in kept)
-        mean = sum(others, first) * (1 / factorial(n - 1))
-        difference = lost_i * _exponential(x_i, n) - lost_o * _exponential(x_o, n)
-        found.append(ops.select(near, alike * mean, apart * difference) * (1 / n))
-    return found
-
-
-def _exponential(x: Value, terms: int) -> Value:
-    """The first terms of the series of exp(x)."""
-    total: Value = 1.0
-    for k in range(terms - 1, 0, -1):
-        total = 1 + total * x * (1 / k)
-    return total
 
 
 def value(rest: Remainder, top: TopMedium, wi: Direction, wo: Direction) -> Value:
