@@ -85,6 +85,17 @@ def test_a_material_becomes_a_simpler_one(run: Run, folder: Path) -> None:
     assert (folder / "pair.png").stat().st_size > 10_000
 
 
+def test_a_mixture_becomes_one_of_simpler_stacks(run: Run, folder: Path) -> None:
+    """Expected: a report and a picture for each stack that is simplified, and one file."""
+    arguments = ("simplify", "half-metallic-paint", "--interfaces", "1", "--model", "bati2021")
+    report = json.loads(run(*arguments, "--json")[1])
+    assert list(report["parts"]) == ["part0"] and report["parts"]["part0"]["error"] > 0
+    status, out, err = run(*arguments, "--plot", "-o", "simple.yaml")
+    assert (status, err, out.splitlines()[-2:]) == (0, "", ["simple.yaml", "half-metallic-paint-part0.png"])
+    assert out.startswith("part0:\n") and (folder / "half-metallic-paint-part0.png").stat().st_size > 10_000
+    assert vt.load("simple.yaml") == vt.Mix.from_dict(report["material"])
+
+
 def test_a_coat_tells_of_a_diffuse_base(run: Run, folder: Path) -> None:
     """Expected: the energy that is kept, as JSON and as a row of the table."""
     save(Stack([Interface(eta=1.4), Diffuse(albedo=0.4)]), folder / "plastic.yaml")

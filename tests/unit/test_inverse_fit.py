@@ -14,6 +14,7 @@ from velatura.errors import InvalidInput
 from velatura.inverse import (
     Directions,
     Fit,
+    MixtureFit,
     ReflectanceTable,
     fit,
     fit_target,
@@ -28,7 +29,7 @@ from velatura.model import Model, named, variance_kind
 from velatura.model.base import Query
 from velatura.model.context import Context
 from velatura.model.registry import stack_lobes
-from velatura.stack import Diffuse, Interface, Material, Medium, Stack, dumps, load, loads
+from velatura.stack import Diffuse, Interface, Material, Medium, Mix, Stack, Texture, dumps, load, loads
 
 pytestmark = pytest.mark.usefixtures("one_thread")
 
@@ -127,6 +128,23 @@ def test_fewer_interfaces_come_less_close() -> None:
     assert 0 < two.error < one.error
     assert [row["theta_i"] for row in two.by_angle] == [0, 20, 40, 55, 70]
     assert all(row["error"] == pytest.approx(row["relative"] * row["wanted"]) for row in two.by_angle)
+
+
+def test_each_stack_of_a_mixture_is_simplified_for_itself(tmp_path: Path) -> None:
+    """Expected: as alone; weights, textures among them, and stacks of few interfaces stay."""
+    bare = Stack([Interface(conductor="Al", alpha=0.2)], name="bare")
+    (tmp_path / "mask.png").write_bytes(b"")
+    mask = Texture(texture=str(tmp_path / "mask.png"))
+    mix = Mix([(mask, Mix([(0.3, COATED), (None, bare)])), (None, bare)], name="both")
+    found = simplify(mix, 1, AVERAGED)
+    assert isinstance(found, MixtureFit) and list(found.parts) == ["part0_part0"]
+    assert found.parts["part0_part0"].stack == simplify(COATED, 1, AVERAGED).stack
+    assert [stack for _, stack in found.material.leaves()] == [found.parts["part0_part0"].stack, bare, bare]
+    assert found.material.flat()["part0_weight"] == mix.flat()["part0_weight"] and found.material.name == "both"
+    with pytest.raises(InvalidInput, match="interfaces: must be fewer than the 2 of the part that has most, got 2"):
+        simplify(Mix([(0.5, COATED), (None, bare)]), 2, AVERAGED)
+    with pytest.raises(InvalidInput, match=r"^part0: interfaces: must be at least 1"):
+        simplify(Mix([(0.5, COATED), (None, bare)]), 0, AVERAGED)
 
 
 def test_more_interfaces_are_never_worse() -> None:

@@ -228,6 +228,12 @@ def test_what_takes_a_single_stack_refuses_a_mixture_in_one_line() -> None:
     assert single("bare-gold", "") == vt.preset("bare-gold")
 
 
+def test_every_stack_is_changed_where_it_is() -> None:
+    named = DUSTY.each(lambda path, stack: stack.replace(name="/".join(map(str, path))))
+    assert [stack.name for _, stack in named.leaves()] == ["0", "1", "2/0", "2/1"]
+    assert named.each(lambda path, stack: stack) == named and named.weighted("")[1][0] == 0.1
+
+
 # Lobes ---------------------------------------------------------------------------------------------------------------
 
 

@@ -6,13 +6,15 @@ chance for one seed in 1500. The seeds are fixed.
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 
 from velatura.errors import InvalidInput
 from velatura.optics import fresnel
 from velatura.reference import Statistics, distribution, statistics
-from velatura.stack import Diffuse, Interface, Medium, Stack
+from velatura.stack import Diffuse, Interface, Medium, Mix, Stack, Texture
 
 SIGMAS = 4.5
 MIRROR = Interface(conductor="mirror", alpha=0.0)
@@ -227,3 +229,35 @@ def test_textures_are_refused(tmp_path) -> None:
 def _with_truth(result: Statistics, truth: np.ndarray | float) -> tuple[np.ndarray, np.ndarray | float, np.ndarray]:
     value, error = total(result)
     return value, truth, error
+
+
+# Mixtures
+
+
+def test_lobes_of_a_mixture_are_those_of_its_stacks_by_their_shares() -> None:
+    """Expected: exactly; what a part transmits is a lobe for itself, and the grids are sums."""
+    glass, metal = Stack(smooth(1.5)), Stack([MIRROR])
+    mix = Mix([(0.25, glass), (None, Mix([(0.4, metal), (None, glass)]))])
+    found, cosines = statistics(mix, [1.0, 0.5], paths=2000), [1.0, 0.5]
+    parts = [statistics(stack, cosines, paths=2000) for _, stack in mix.leaves()]
+    shares = [0.25, 0.75 * 0.4, 0.75 * 0.6]
+    assert found.standard_error is not None and isinstance(found.transmitted, list)
+    for n, (share, part) in enumerate(zip(shares, parts)):
+        assert part.standard_error is not None
+        assert np.allclose(found.energy[n], share * part.energy[0], rtol=1e-12)
+        assert np.allclose(found.standard_error.energy[n], share * part.standard_error.energy[0], rtol=1e-12)
+        assert np.array_equal(found.alpha[n], part.alpha[0], equal_nan=True)
+    assert [lobe.energy[0, 0] for lobe in found.transmitted] == pytest.approx([0.25 * 0.96, 0.45 * 0.96], abs=0.03)
+    assert np.allclose(found.truncated, 0)
+    grids = distribution(mix, 1.0, paths=2000, bins=4)
+    assert grids.transmitted is not None
+    assert grids.reflected.sum() + grids.transmitted.sum() == pytest.approx(3, abs=1e-4)
+
+
+def test_weights_that_vary_have_no_statistics(tmp_path: Path) -> None:
+    mask = tmp_path / "mask.png"
+    mask.write_bytes(b"")
+    mix = Mix([(Texture(texture=str(mask)), Stack(smooth(1.5))), (None, Stack([MIRROR]))])
+    for ask in (statistics, distribution):
+        with pytest.raises(InvalidInput, match=r"^part0_weight: is a texture, .*; replace it by a number$"):
+            ask(mix, 1.0, paths=10)

@@ -394,6 +394,32 @@ def test_every_question_has_an_answer(
         assert np.allclose(found.own_alpha[0], 0.2) and np.allclose(found.eta[0], 1.5)
 
 
+def test_weights_and_values_of_parts_are_swept(tmp_path: Path) -> None:
+    """Expected: lobes of all stacks; sums that are linear in a weight; what each part transmits for itself."""
+    glass = vt.Stack([vt.Interface(eta=1.5, alpha=0.1)])
+    mix = vt.Mix([(0.5, glass), (None, vt.Mix([(0.5, "bare-gold"), (None, glass)]))])
+    vary = {
+        "part0_weight": {"range": [0.0, 1.0], "steps": 3},
+        "part1_part0_layer0_alpha": {"values": [0.1, 0.3]},
+    }
+    space = {"material": mix, "vary": vary}
+    found = swept(space, "lobes", tmp_path / "a.zarr", **LOBES)
+    assert found.reason.isnull().all() and found.energy.dims[:3] == (*vary, "interface")
+    one = mix.replace(part0_weight=0.5, part1_part0_layer0_alpha=0.3)
+    assert np.array_equal(found.energy[1, 1], vt.lobes(one, **LOBES).energy)
+    assert found.transmitted_energy.dims == (*vary, "part", "colour", "direction")
+    albedo = swept(space, "albedo", tmp_path / "b.zarr", **LOBES).reflected
+    assert np.allclose(albedo[1], (albedo[0] + albedo[2]) / 2, atol=1e-12) and np.allclose(albedo[2, 0], albedo[2, 1])
+    walked = swept(space, "statistics", tmp_path / "c.zarr", cos_theta=0.7, paths=500)
+    assert walked.reason.isnull().all() and walked.transmitted_mean_error.dims[2:] == ("part", "component", "direction")
+    assert (walked.energy[2, :, 1:] == 0).all() and (walked.energy[1, :, 1:] > 0).all()
+    others = {"material": mix, "vary": {"material": {"values": ["worn-painted-steel", mix]}}}
+    albedo = swept(others, "albedo", tmp_path / "d.zarr", **LOBES)
+    assert albedo.status.values.tolist() == [FAILED, DONE] and "part0_weight=0.5" in albedo.reason.values[0]
+    with pytest.raises(vt.InvalidInput, match="inverse: takes a single stack, not a mixture"):
+        swept(space, "inverse", tmp_path / "e.zarr", model="bati2021")
+
+
 def test_the_inverse_of_a_stack_keeps_its_films(tmp_path: Path) -> None:
     oxide = vt.Stack([vt.Interface(conductor="Al", alpha=0.1, films=[vt.Film(eta=2.4, thickness_nm=60)])])
     varied = {"layer0_film0_thickness_nm": {"values": [60.0, 90.0]}}
@@ -462,6 +488,10 @@ def test_a_plan_names_files_beside_it_and_its_mistakes(run: Run, tmp_path: Path)
     fields = {**GOLD, "material": "gold.yaml", "what": "albedo", "options": {"cos_theta": 1}}
     plan.write_text(yaml.safe_dump(fields))
     assert load_plan(plan).material == vt.preset("bare-gold")
+    mixed = {"mix": [{"weight": 0.5, "material": "gold.yaml"}, {"material": "coated-gold"}]}
+    vary = {"part0_weight": {"values": [0.2]}}
+    plan.write_text(yaml.safe_dump({**fields, "material": mixed, "vary": vary}))
+    assert load_plan(plan).material == vt.Mix([(0.5, "bare-gold"), (None, "coated-gold")])
     for key, value, message in [
         ("whta", "albedo", "unknown key 'whta' (did you mean what?)"),
         ("what", "albdo", "what: unknown question 'albdo' (did you mean albedo?)"),

@@ -87,6 +87,15 @@ def show(found: Fit, output: Path | None, picture: Path | None, as_json: bool, o
         walked = {"model_error": vars(own)} if own else {}
         print(json.dumps({"model": found.model.name, **found.to_dict(), **walked}, allow_nan=False))
         return
+    report(found)
+    invert.say_for_which(found.model)
+    print(output if output else dumps(found.stack, "yaml"), end="\n" if output else "")
+    if picture:
+        print(picture)
+
+
+def report(found: Fit) -> None:
+    """Print errors, energies, parameters and other stacks of a fit."""
     console = options.console()
     of = "log(1 + f cos), and ten times of energies" if found.energies else "log(1 + f cos)"
     print(f"Error of {of}: {found.error:.2g} (from other starts: {_others(found)})")
@@ -105,10 +114,6 @@ def show(found: Fit, output: Path | None, picture: Path | None, as_json: bool, o
         count = len(other.stack.interfaces)
         layers = " | ".join(_written(layer) for layer in other.stack.layers)
         print(f"Fits as well ({n}): error {other.error:.2g}, {count} interface{'s' * (count > 1)}: {layers}")
-    invert.say_for_which(found.model)
-    print(output if output else dumps(found.stack, "yaml"), end="\n" if output else "")
-    if picture:
-        print(picture)
 
 
 def _written(layer: Any) -> str:

@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+import json
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from velatura.cli import fit, invert, options, progress
+
+if TYPE_CHECKING:
+    from velatura.inverse import MixtureFit
 
 
 def simplify(
@@ -19,19 +23,49 @@ def simplify(
     settings: options.Settings = None,
     as_json: options.Json = False,
 ) -> None:
-    """Find the stack of fewer interfaces closest to a material."""
+    """Find the stack of fewer interfaces closest to a material.
+
+    Of a mixture each stack is simplified for itself; with --plot each has a picture of its own, such as M-part0.png.
+    """
     # Refuse what cannot work before anything slow begins
     described, switches = options.read(material, settings)
     from velatura import inverse
     from velatura.inverse.fitting.simplify import compared
-    from velatura.stack import single
-
-    stack = single(described, "simplify")
+    from velatura.stack.flat_names import prefix
 
     fit.check(output)
-    picture, name = invert.picture(material) if plot else None, Path(material).stem
+    name, chosen = Path(material).stem, options.model_name(model)
+    stacks = {prefix(path).rstrip("_"): stack for path, stack in described.leaves()}
+    pictures = {
+        part: invert.picture(f"{name}-{part}" if part else material)
+        for part, stack in stacks.items()
+        if plot and (not part or len(stack.interfaces) > interfaces)
+    }
     with progress.clock(f"Simplifying {name}"):
-        found = inverse.simplify(stack, interfaces, options.model_name(model), **switches)
-    if picture:
-        fit.draw(compared(stack, found.model), found, stack.name or name, picture)
-    fit.show(found, output, picture, as_json)
+        found = inverse.simplify(described, interfaces, chosen, **switches)
+    parts = found.parts if isinstance(found, inverse.MixtureFit) else {"": found}
+    for part, picture in pictures.items():
+        title = " ".join(filter(None, (stacks[part].name or name, part)))
+        fit.draw(compared(stacks[part], parts[part].model), parts[part], title, picture)
+    if isinstance(found, inverse.MixtureFit):
+        _show(found, output, list(pictures.values()), as_json)
+    else:
+        fit.show(found, output, pictures.get(""), as_json)
+
+
+def _show(found: MixtureFit, output: Path | None, pictures: list[Path], as_json: bool) -> None:
+    """Write the mixture, and print it with the errors of its parts."""
+    from velatura.stack import dumps, save
+
+    if output:
+        save(found.material, output)
+    if as_json:
+        print(json.dumps({"model": found.model.name, **found.to_dict()}, allow_nan=False))
+        return
+    for part, each in found.parts.items():
+        print(f"{part}:")
+        fit.report(each)
+    invert.say_for_which(found.model)
+    print(output if output else dumps(found.material, "yaml"), end="\n" if output else "")
+    for picture in pictures:
+        print(picture)

@@ -8,7 +8,7 @@ from velatura.inverse.coats import Coated, coat
 from velatura.inverse.fitting.angles import Directions, ReflectanceTable, table_of
 from velatura.inverse.fitting.descent import Estimate, Fit, Other, fit
 from velatura.inverse.fitting.model_error import ModelError, model_error
-from velatura.inverse.fitting.simplify import fit_target, simplify
+from velatura.inverse.fitting.simplify import MixtureFit, fit_target, simplify
 from velatura.inverse.invert import alternatives, grazing, invert_stack, on_black
 from velatura.inverse.lobes import smooth_pair
 from velatura.inverse.lobes.equivalence import Coordinate, EquivalenceClass
@@ -34,6 +34,7 @@ __all__ = [
     "Fixed",
     "Infeasible",
     "Layers",
+    "MixtureFit",
     "ModelError",
     "Other",
     "Paint",

@@ -3,6 +3,15 @@
 from velatura.reference import plugin  # noqa: F401  (declares it)
 from velatura.reference.distribution import Distribution, distribution
 from velatura.reference.polarised import Stokes, stokes
-from velatura.reference.statistics import Statistics, WalkedLobe, statistics
+from velatura.reference.statistics import MixtureStatistics, Statistics, WalkedLobe, statistics
 
-__all__ = ["Distribution", "Statistics", "Stokes", "WalkedLobe", "distribution", "statistics", "stokes"]
+__all__ = [
+    "Distribution",
+    "MixtureStatistics",
+    "Statistics",
+    "Stokes",
+    "WalkedLobe",
+    "distribution",
+    "statistics",
+    "stokes",
+]

@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 from velatura.light.square_bins import BINS, grids
 from velatura.optics.directions import directions
 from velatura.reference.batches import trace
-from velatura.stack import MaterialLike, Stack, single
+from velatura.stack import Described, MaterialLike, Stack, load
 
 Array = NDArray[np.floating]
 
@@ -39,13 +39,22 @@ def distribution(
 ) -> Distribution:
     """Energies of reflected and transmitted light on a grid over the projected disc; arguments as `statistics`.
 
+    Those of a mixture are sums of its stacks', by their shares.
+
     Raises:
         InvalidInput, MissingTool: as `statistics`.
     """
-    stack = single(stack, "a distribution")
-    each = [_walked(stack, wi, paths, seed, microsurface, bins, polarised) for wi in directions(cos_theta, phi)]
+    material: Described = load(stack)
+    shares, stacks = zip(*material.weighted("a distribution is that of one point; replace it by a number"))
+    each = [
+        sum(
+            share * _walked(stack, wi, paths, seed, microsurface, bins, polarised)
+            for share, stack in zip(shares, stacks)
+        )
+        for wi in directions(cos_theta, phi)
+    ]
     reflected, transmitted = (np.stack([pair[side] for pair in each], axis=1) for side in (0, 1))
-    return Distribution(reflected, transmitted if stack.transmits else None)
+    return Distribution(reflected, transmitted if any(stack.transmits for stack in stacks) else None)
 
 
 def _walked(stack: Stack, wi: Array, paths: int, seed: int, microsurface: bool, bins: int, polarised: bool) -> Array:

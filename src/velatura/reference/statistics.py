@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
+from typing import overload
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -12,7 +13,7 @@ from velatura.optics import fresnel, ggx
 from velatura.optics.directions import directions
 from velatura.reference import roughness
 from velatura.reference.batches import ends, mean_and_error, relative_index
-from velatura.stack import Interface, Layer, MaterialLike, Stack, single
+from velatura.stack import Described, Interface, Layer, MaterialLike, Mix, Stack, load
 
 Array = NDArray[np.floating]
 
@@ -50,6 +51,88 @@ class Statistics:
     truncated: Array
     standard_error: Statistics | None = None
 
+    def times(self, share: float) -> Statistics:
+        """The same lobes with a share of the light."""
+        below, error = self.transmitted, self.standard_error
+        return replace(
+            self,
+            energy=[share * energy for energy in self.energy],
+            transmitted=below and replace(below, energy=share * below.energy),
+            truncated=share * self.truncated,
+            standard_error=error and error.times(share),
+        )
+
+
+@dataclass(frozen=True)
+class MixtureStatistics:
+    """The lobes of all stacks of a mixture, in `parts`, with energies times the shares of these.
+
+    Lists run over the reflected lobes of all parts, one after the other, and `transmitted` over parts that transmit;
+    truncated (N,) is a sum. `standard_error` has the same names.
+    """
+
+    parts: list[Statistics]
+
+    @property
+    def energy(self) -> list[Array]:
+        return self._each("energy")
+
+    @property
+    def alpha(self) -> list[Array]:
+        return self._each("alpha")
+
+    @property
+    def rotation(self) -> list[Array]:
+        return self._each("rotation")
+
+    @property
+    def mean(self) -> list[Array]:
+        return self._each("mean")
+
+    @property
+    def covariance(self) -> list[Array]:
+        return self._each("covariance")
+
+    @property
+    def transmitted(self) -> list[WalkedLobe]:
+        return [part.transmitted for part in self.parts if part.transmitted]
+
+    @property
+    def truncated(self) -> Array:
+        return np.asarray(sum(part.truncated for part in self.parts))
+
+    @property
+    def standard_error(self) -> MixtureStatistics | None:
+        errors = [part.standard_error for part in self.parts if part.standard_error]
+        return MixtureStatistics(errors) if errors else None
+
+    def _each(self, name: str) -> list[Array]:
+        return [lobe for part in self.parts for lobe in getattr(part, name)]
+
+
+@overload
+def statistics(
+    stack: Stack,
+    cos_theta: ArrayLike,
+    phi: ArrayLike = 0.0,
+    paths: int = 10**6,
+    seed: int = 0,
+    microsurface: bool = False,
+    polarised: bool = False,
+) -> Statistics: ...
+
+
+@overload
+def statistics(
+    stack: MaterialLike,
+    cos_theta: ArrayLike,
+    phi: ArrayLike = 0.0,
+    paths: int = 10**6,
+    seed: int = 0,
+    microsurface: bool = False,
+    polarised: bool = False,
+) -> Statistics | MixtureStatistics: ...
+
 
 def statistics(
     stack: MaterialLike,
@@ -59,8 +142,8 @@ def statistics(
     seed: int = 0,
     microsurface: bool = False,
     polarised: bool = False,
-) -> Statistics:
-    """Statistics of the light that a stack reflects and transmits, by random walks through it.
+) -> Statistics | MixtureStatistics:
+    """Statistics of the light that a material reflects and transmits, by random walks through it.
 
     The equivalent alpha of a lobe is that of the single GGX reflection, at the same incidence, whose half-vectors have
     the same median slope. Where all interfaces down to the lobe's are isotropic, that is the median length of slopes;
@@ -68,9 +151,10 @@ def statistics(
     transmitted light are those of its mirror image and of `wi` refracted through the whole stack (Belcour 2018, 4.2).
 
     Light of a metal by name or by tables is walked at three wavelengths of each channel (docs/explanation/model.md).
+    Each stack of a mixture is walked for itself, with all `paths`.
 
     Args:
-        stack: a material (a stack, a file, or a preset's name).
+        stack: a material (a stack, a mixture, a file, or a preset's name).
         cos_theta: cosines of the directions of incidence, in (0, 1]: a number, or a list of N.
         phi: their azimuths from the tangent, radians: one for all, or N.
         paths: walks for each direction.
@@ -84,7 +168,17 @@ def statistics(
             number is needed.
         MissingTool: LLVM is missing or too old; the message names the package to install.
     """
-    stack = single(stack, "statistics")
+    material: Described = load(stack)
+    if not isinstance(material, Mix):
+        return _of_stack(material, cos_theta, phi, paths, seed, microsurface, polarised)
+    shares = material.weighted("statistics are those of one point; replace it by a number")
+    walked = (cos_theta, phi, paths, seed, microsurface, polarised)
+    return MixtureStatistics([_of_stack(stack, *walked).times(share) for share, stack in shares])
+
+
+def _of_stack(
+    stack: Stack, cos_theta: ArrayLike, phi: ArrayLike, paths: int, seed: int, microsurface: bool, polarised: bool
+) -> Statistics:
     columns = [_column(stack, wi, paths, seed, microsurface, polarised) for wi in directions(cos_theta, phi)]
     truncated = np.array([lost for _, lost in columns])
     values, errors = (_collect([[pair[i] for pair in lobes] for lobes, _ in columns]) for i in (0, 1))

@@ -5,7 +5,7 @@ from __future__ import annotations
 import contextlib
 import dataclasses
 import re
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextvars import ContextVar
 from importlib import import_module
 from pathlib import Path
@@ -142,6 +142,14 @@ class Mix(Record):
         """
         weights = {at.name: at.plain(value, refusal) for at, value in self.values() if at.declared is WEIGHT}
         return [(share, stack) for share, (_, stack) in zip(self.shares(weights), self.leaves())]
+
+    def each(self, change: Callable[[tuple[int, ...], Stack], Stack]) -> Mix:
+        """The mixture with every stack changed, by the numbers of the parts that it is in."""
+        parts = []
+        for index, part in enumerate(self.mix):
+            material = part.material.each(lambda path, stack: change((index, *path), stack))  # noqa: B023 (called here)
+            parts.append(part.model_copy(update={"material": material}))
+        return Mix(parts, name=self.name, source=self.source)
 
     def turned(self, degrees: float) -> Mix | None:
         """All parts turned, as `Stack.turned`."""

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from typing import Annotated, Any
 
 from pydantic import model_validator
@@ -71,6 +71,10 @@ class Stack(Record):
     def leaves(self) -> Iterator[tuple[tuple[int, ...], Stack]]:
         """The stack alone, which is in no part of a mixture."""
         yield (), self
+
+    def each(self, change: Callable[[tuple[int, ...], Stack], Stack]) -> Stack:
+        """The stack changed, as `Mix.each` changes all stacks."""
+        return change((), self)
 
     def shares(self, weights: Mapping[str, Any]) -> list[Any]:
         """The share of the stack in itself, as `Mix.shares`."""

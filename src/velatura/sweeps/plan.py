@@ -15,6 +15,7 @@ from pydantic import Field, model_validator
 
 from velatura.errors import within
 from velatura.stack import io
+from velatura.stack.paths import rewritten
 from velatura.stack.schema import Parameter, show, unknown
 from velatura.sweeps.questions import QUESTIONS, Question
 from velatura.sweeps.space import Number, Space
@@ -27,7 +28,7 @@ PACKAGES = ("mitsuba", "drjit", "numpy", "scipy")
 class QuestionName(Parameter):
     """The name of a question, or a function."""
 
-    what = f"one of {', '.join(QUESTIONS)}, or in Python a function (stack, seed)"
+    what = f"one of {', '.join(QUESTIONS)}, or in Python a function (material, seed)"
 
     def check(self, value: Any) -> str | Callable[..., Any]:
         if isinstance(value, str) and value not in QUESTIONS:
@@ -53,7 +54,7 @@ class Plan(Space):
 
     Args:
         what: `lobes`, `albedo`, `statistics`, `distribution`, `check`, `render` or `inverse`; or a function that is
-            called with the stack and the seed of a point, and returns its arrays by name.
+            called with the material and the seed of a point, and returns its arrays by name.
         options: keyword arguments of it.
         chunk: points in a chunk of the store, at most, which is computed and written at once. By default, half the
             root of the number of points.
@@ -101,7 +102,9 @@ def _beside(folder: Path, fields: Any) -> Any:
         return fields
 
     def found(material: Any) -> Any:
-        return str(folder / material) if isinstance(material, str) and Path(material).suffix else material
+        if isinstance(material, str):
+            return str(folder / material) if Path(material).suffix else material
+        return rewritten(material, lambda path: str(folder / path))
 
     fields, vary = {**fields, "material": found(fields.get("material"))}, fields.get("vary")
     axis = vary.get("material") if isinstance(vary, Mapping) else None

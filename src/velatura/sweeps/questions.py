@@ -1,4 +1,4 @@
-"""Questions of a sweep to a stack: named ones, and functions of one's own.
+"""Questions of a sweep to a material: named ones, and functions of one's own.
 
 An answer holds arrays by name, each with the names of its dimensions: `{"energy": (("interface", "colour"), array)}`.
 """
@@ -13,10 +13,10 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from velatura.errors import InvalidInput
-from velatura.model import DEFAULT
+from velatura.model import DEFAULT, registry
 from velatura.model.registry import stack_lobes
 from velatura.optics.directions import directions
-from velatura.stack import InterfaceValues, Material, SlabValues, Stack
+from velatura.stack import Described, InterfaceValues, Material, SlabValues, single
 
 Array = NDArray[Any]
 Answer: TypeAlias = dict[str, tuple[tuple[str, ...], Array]]
@@ -72,7 +72,8 @@ class Question:
     """A question.
 
     Args:
-        ask: called with a stack, a seed and the options; returns arrays by name, with or without names of dimensions.
+        ask: called with a material, a seed and the options; returns arrays by name, with or without names of their
+            dimensions.
         coordinates: of the dimensions, for options.
     """
 
@@ -94,27 +95,26 @@ def meaning(name: str) -> dict[str, str]:
 
 
 def lobes(
-    stack: Stack, seed: int, cos_theta: ArrayLike, phi: ArrayLike = 0.0, model: str = DEFAULT, **switches: str
+    material: Described, seed: int, cos_theta: ArrayLike, phi: ArrayLike = 0.0, model: str = DEFAULT, **switches: str
 ) -> Answer:
     """The lobes of a model, as `velatura.lobes` returns them."""
-    found = stack_lobes(stack, cos_theta, phi, model, **switches)
+    found = registry.lobes(material, cos_theta, phi, model, **switches)
     answer = _lists(found, ("energy", "alpha", "rotation", "covariance", "own_alpha", "own_rotation"))
-    if found.transmitted:
-        answer |= _one(found.transmitted, ("energy", "alpha", "rotation", "covariance"), "transmitted_")
+    answer |= _below(found.transmitted, ("energy", "alpha", "rotation", "covariance"))
     return answer | {name: (_BY_COLOUR, getattr(found, name)) for name in ("remainder", "passed", "absorbed")}
 
 
 def albedo(
-    stack: Stack, seed: int, cos_theta: ArrayLike, phi: ArrayLike = 0.0, model: str = DEFAULT, **switches: str
+    material: Described, seed: int, cos_theta: ArrayLike, phi: ArrayLike = 0.0, model: str = DEFAULT, **switches: str
 ) -> Answer:
     """The energy that a model reflects, transmits and absorbs."""
-    found = stack_lobes(stack, cos_theta, phi, model, **switches)
+    found = registry.lobes(material, cos_theta, phi, model, **switches)
     energies = {"reflected": sum(found.energy) + found.remainder, "transmitted": found.passed}
     return {name: (_BY_COLOUR, energy) for name, energy in (energies | {"absorbed": found.absorbed}).items()}
 
 
 def statistics(
-    stack: Stack,
+    material: Described,
     seed: int,
     cos_theta: ArrayLike,
     phi: ArrayLike = 0.0,
@@ -125,19 +125,17 @@ def statistics(
     """Statistics of the reference's lobes, as `velatura.reference.statistics` returns them, with standard errors."""
     from velatura import reference
 
-    found = reference.statistics(stack, cos_theta, phi, paths, seed, microsurface, polarised)
+    found = reference.statistics(material, cos_theta, phi, paths, seed, microsurface, polarised)
     answer: Answer = {}
     for side, ending in ((found, ""), (found.standard_error, "_error")):
         assert side is not None
         answer |= {f"{name}{ending}": lobe for name, lobe in _lists(side, _WALKED).items()}
-        if side.transmitted:
-            below = _one(side.transmitted, _WALKED, "transmitted_")
-            answer |= {f"{name}{ending}": lobe for name, lobe in below.items()}
+        answer |= {f"{name}{ending}": lobe for name, lobe in _below(side.transmitted, _WALKED).items()}
     return answer | {"truncated": (("direction",), found.truncated)}
 
 
 def distribution(
-    stack: Stack,
+    material: Described,
     seed: int,
     cos_theta: ArrayLike,
     phi: ArrayLike = 0.0,
@@ -149,17 +147,17 @@ def distribution(
     """Energies of the reference over the projected disc, as `velatura.reference.distribution` returns them."""
     from velatura import reference
 
-    found = reference.distribution(stack, cos_theta, phi, paths, seed, microsurface, bins, polarised)
+    found = reference.distribution(material, cos_theta, phi, paths, seed, microsurface, bins, polarised)
     sides = {"reflected": found.reflected, "transmitted": found.transmitted}
     return {name: ((*_BY_COLOUR, "x", "y"), grid) for name, grid in sides.items() if grid is not None}
 
 
-def check(stack: Stack, seed: int, model: str = DEFAULT, **switches: Any) -> Answer:
-    """Values that decide each law, as `velatura.check` reports them; NaN for laws that say nothing about the stack."""
+def check(material: Described, seed: int, model: str = DEFAULT, **switches: Any) -> Answer:
+    """Values that decide each law, as `velatura.check` reports them; NaN for laws that say nothing of the material."""
     from velatura import api
     from velatura.checks import LAWS
 
-    report = api.check(stack, model, **switches)
+    report = api.check(material, model, **switches)
     found = {finding.law: finding for finding in report.findings}
     rows = [found.get(law.name) for law in LAWS]
     numbers = {
@@ -172,7 +170,7 @@ def check(stack: Stack, seed: int, model: str = DEFAULT, **switches: Any) -> Ans
 
 
 def render(
-    stack: Stack,
+    material: Described,
     seed: int,
     scene: str = "ball",
     env: str | None = None,
@@ -184,16 +182,17 @@ def render(
     """A picture, as `velatura.render` returns it: linear RGB, (height, width, 3)."""
     from velatura import api
 
-    picture = api.render(stack, scene, env, spp, size, model, seed, **switches)
+    picture = api.render(material, scene, env, spp, size, model, seed, **switches)
     return {"image": (("row", "column", "colour"), np.asarray(picture))}
 
 
-def inverse(stack: Stack, seed: int, model: str = DEFAULT, **switches: str) -> Answer:
+def inverse(material: Described, seed: int, model: str = DEFAULT, **switches: str) -> Answer:
     """The stack that inverse design finds for lobes of a stack at normal incidence, its films kept: as asked, and by
     interface."""
     from velatura.inverse import invert_stack
     from velatura.inverse.lobes.target import ROUND
 
+    stack = single(material, "inverse")
     if stack.base:
         raise InvalidInput("inverse: not of a stack with a diffuse base")
     asked = stack_lobes(stack, 1.0, 0.0, model, **switches)
@@ -244,9 +243,12 @@ def _lists(found: Any, names: Sequence[str]) -> Answer:
     return {name: _dims(name, np.stack(getattr(found, name)), "interface") for name in names}
 
 
-def _one(lobe: Any, names: Sequence[str], prefix: str) -> Answer:
-    """Quantities of a lobe."""
-    return {prefix + name: _dims(name, getattr(lobe, name)) for name in names}
+def _below(lobes: Any, names: Sequence[str]) -> Answer:
+    """Quantities of what is transmitted, if anything is: a lobe, or of a mixture one of every part that transmits."""
+    if isinstance(lobes, list):
+        each = {name: [getattr(lobe, name) for lobe in lobes] for name in names if lobes}
+        return {f"transmitted_{name}": _dims(name, np.stack(values), "part") for name, values in each.items()}
+    return {f"transmitted_{name}": _dims(name, getattr(lobes, name)) for name in names if lobes}
 
 
 def _dims(name: str, values: Array, *first: str) -> tuple[tuple[str, ...], Array]:

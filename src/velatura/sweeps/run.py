@@ -51,8 +51,8 @@ def sweep(
     Args:
         space: a `Space`, or its mapping: `material`, `vary`, `sampling`, `count`, `seed`.
         what: "lobes", "albedo", "statistics", "distribution", "check", "render" or "inverse", as the functions of these
-            names; or a function, called with the stack and the seed of a point, that returns its arrays by name, each
-            alone or as a pair of the names of its dimensions and the array.
+            names; or a function, called with the material and the seed of a point, that returns its arrays by name,
+            each alone or as a pair of the names of its dimensions and the array.
         store: the folder, which all workers must see.
         executor: where it runs: None, one process of dask for each core of this machine; the address of a scheduler of
             dask, or its client; or any executor in the style of `concurrent.futures`.

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from pydantic import model_validator
 
 from velatura.errors import InvalidInput, within
-from velatura.stack import Stack, addressed, single
+from velatura.stack import Described, Mix, Stack, addressed, load
 from velatura.stack.schema import Parameter, Record
 from velatura.stack.values import LARGEST, Choice, Flag, Scalar, Whole
 
@@ -69,9 +69,10 @@ class MaterialSource(Parameter):
 
     what = "a material"
 
-    def check(self, value: Any) -> Stack:
+    def check(self, value: Any) -> Described:
         try:
-            return single(value, "a sweep")
+            found: Described = load(value)
+            return found
         except InvalidInput as error:
             raise ValueError(str(error)) from None
 
@@ -187,7 +188,7 @@ class StoredAxis:
     def stored(self, value: Any) -> Any:
         """A value as it is written."""
         if self.form == "text":
-            return (value.name or json.dumps(value.to_dict())) if isinstance(value, Stack) else str(value)
+            return (value.name or json.dumps(value.to_dict())) if isinstance(value, Stack | Mix) else str(value)
         return np.broadcast_to(np.asarray(value, float), {"colour": (3,), "pair": (2,)}.get(self.form, ()))
 
 
@@ -215,9 +216,9 @@ class Space(Record):
     """A material of which some values vary, and the points that are looked at.
 
     Args:
-        material: a stack, a file, the name of a preset, or the mapping of a file.
-        vary: by flat name (`layer0_alpha`, as `Stack.replace` takes them) an `Axis`, or its mapping. The values of
-            `material` are materials in place of that one.
+        material: a stack, a mixture, a file, the name of a preset, or the mapping of a file.
+        vary: by flat name (`layer0_alpha`, `part0_weight`, as `replace` takes them) an `Axis`, or its mapping. The
+            values of `material` are materials in place of that one.
         sampling: `grid`, all combinations; `random`, independent points; `sobol`, points of a scrambled Sobol sequence,
             which fill the space evenly.
         count: points of the latter two.
@@ -227,7 +228,7 @@ class Space(Record):
         InvalidInput: in one line that names the key and what is allowed.
     """
 
-    material: Annotated[Stack, MaterialSource("a material: a file, a preset, or its layers")]
+    material: Annotated[Stack | Mix, MaterialSource("a material: a file, a preset, or its layers")]
     vary: Annotated[dict[str, Axis], Axes("flat names, and how each varies")]
     sampling: Annotated[str, Choice("how points are chosen", options=("grid", "random", "sobol"))] = "grid"
     count: Annotated[int | None, Number("points, of random and sobol", low=1)] = None
@@ -299,10 +300,10 @@ class Space(Record):
             return [{name: axis.grid[i] for (name, axis), i in zip(self.vary.items(), each)} for each in indices]
         return [self._point(u) for u in self._uniform(numbers)]
 
-    def stack(self, values: Mapping[str, Any]) -> Stack:
-        """The stack of a point."""
+    def stack(self, values: Mapping[str, Any]) -> Described:
+        """The stack or the mixture of a point."""
         others = {name: value for name, value in values.items() if name != "material"}
-        base: Stack = values.get("material", self.material)
+        base: Described = values.get("material", self.material)
         return base.replace(**others) if others else base
 
     def seeds(self, numbers: Sequence[int]) -> list[int]:

@@ -6,13 +6,14 @@ The future work that Bati et al. 2021 name in their section 8.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 from itertools import combinations
 from math import comb
-from typing import Any
+from typing import Any, overload
 
 import numpy as np
 
-from velatura.errors import InvalidInput
+from velatura.errors import InvalidInput, within
 from velatura.inverse.fitting import angles
 from velatura.inverse.fitting.angles import Directions, ReflectanceTable
 from velatura.inverse.fitting.descent import Descent, End, Fit, descended, fit
@@ -24,6 +25,7 @@ from velatura.inverse.solution import Solution
 from velatura.model import DEFAULT, Model, named, variance_kind
 from velatura.model.variance import Isotropic
 from velatura.stack import (
+    Described,
     Diffuse,
     Interface,
     InterfaceValues,
@@ -32,10 +34,12 @@ from velatura.stack import (
     MaterialLike,
     Measured,
     Medium,
+    Mix,
     Stack,
     as_described,
-    single,
+    load,
 )
+from velatura.stack.flat_names import prefix
 from velatura.stack.schema import parameters
 from velatura.stack.values import Colour
 
@@ -91,23 +95,75 @@ def _form(target: Target) -> list[tuple[int, str]]:
     return [(lobe.interfaces, lobe.base) for lobe in target.lobes]
 
 
+@dataclass(frozen=True)
+class MixtureFit:
+    """A mixture with simpler stacks, and each of these as a fit, by the name of its part: `part0`, `part1_part0`.
+
+    Stacks of as few interfaces as are kept, or fewer, are in the mixture alone.
+    """
+
+    material: Mix
+    model: Model
+    parts: dict[str, Fit]
+
+    def to_dict(self) -> dict[str, Any]:
+        """The mixture and the reports of its parts as JSON has them."""
+        return {
+            "material": self.material.to_dict(),
+            "parts": {name: found.to_dict() for name, found in self.parts.items()},
+        }
+
+
+@overload
+def simplify(
+    stack: Stack, interfaces: int, model: str | Model = DEFAULT, eta_max: float = 4.0, **switches: str
+) -> Fit: ...
+
+
+@overload
 def simplify(
     stack: MaterialLike, interfaces: int, model: str | Model = DEFAULT, eta_max: float = 4.0, **switches: str
-) -> Fit:
+) -> Fit | MixtureFit: ...
+
+
+def simplify(
+    stack: MaterialLike, interfaces: int, model: str | Model = DEFAULT, eta_max: float = 4.0, **switches: str
+) -> Fit | MixtureFit:
     """The stack of fewer interfaces whose reflectance comes closest to that of a stack, at all angles.
 
     It keeps some of the interfaces, the last one if nothing passes it, and a diffuse base; their values, and absorption
     below each but the last, then descend. Only what is reflected is compared: first the energy in every colour at
-    every angle of incidence, then how it is spread.
+    every angle of incidence, then how it is spread. Of a mixture each stack that has more interfaces is simplified for
+    itself; weights stay.
 
     Args:
-        stack: a material (a stack, a file, or a preset's name).
+        stack: a material (a stack, a mixture, a file, or a preset's name).
         interfaces: how many are kept, at least 1, and fewer than there are; fewer, where the last gain nothing.
 
     Raises:
         InvalidInput: not a valid material, no such number of interfaces, a texture, an unknown model or switch.
     """
-    chosen, stack = named(model, **switches), single(stack, "simplify")
+    chosen = named(model, **switches)
+    material: Described = load(stack)
+    if not isinstance(material, Mix):
+        return _simplified(material, interfaces, chosen, eta_max)
+    most = max(len(each.interfaces) for _, each in material.leaves())
+    if most <= interfaces:
+        raise InvalidInput(f"interfaces: must be fewer than the {most} of the part that has most, got {interfaces}")
+    parts: dict[str, Fit] = {}
+
+    def simpler(path: tuple[int, ...], each: Stack) -> Stack:
+        if len(each.interfaces) <= interfaces:
+            return each
+        name = prefix(path).rstrip("_")
+        with within(name):
+            parts[name] = _simplified(each, interfaces, chosen, eta_max)
+        return parts[name].stack
+
+    return MixtureFit(material.each(simpler), chosen, parts)
+
+
+def _simplified(stack: Stack, interfaces: int, chosen: Model, eta_max: float) -> Fit:
     count = len(stack.interfaces)
     if count == 1:
         raise InvalidInput("interfaces: the material has one, and none can have fewer")
