@@ -32,6 +32,7 @@ from machines import MACHINES, SLOTS, Machine
 from spirv import counts
 
 import velatura as vt
+from velatura.model.solved.bsdf import MAX_SAMPLE_WEIGHT
 from velatura.shader import constant, record, shader
 from velatura.shader.printers.glsl import Vulkan
 from velatura.shader.program import prefixed
@@ -91,6 +92,36 @@ def test_a_medium_on_top_is_the_model_in_every_language(name: str, layers: list[
     truth, found = (replace(each, alpha=0 * each.alpha + 1) for each in (truth, found))
     apart = differences(truth, found)
     assert max(apart.energy, apart.drawn) < 1e-4
+    assert max(apart.value, apart.density) < 1e-3
+
+
+#: Panes that pass and reflect light too wide for lobes; the last one is coloured.
+WIDE: dict[str, tuple[list[vt.Interface | vt.Medium], str]] = {
+    "glsl450": ([vt.Interface(eta=1.5, alpha=0.4), vt.Interface(eta=1.0, alpha=0.3)], "forward"),
+    "vulkan": ([vt.Interface(eta=1.4, alpha=0.9), vt.Interface(eta=1.0, alpha=0.6)], "symmetric"),
+    "hlsl": ([vt.Interface(eta=1.5, alpha=0.2), vt.Interface(eta=1.0, alpha=0.1)], "forward"),
+    "slang": ([vt.Interface(eta=1.5, alpha=[0.4, 0.44]), vt.Interface(eta=1.0, alpha=0.3)], "forward"),
+    "wgsl": (
+        [vt.Interface(eta=1.5, alpha=0.5), vt.Medium(sigma_a=(0.1, 0.5, 1)), vt.Interface(eta=1, alpha=0.3)],
+        "forward",
+    ),
+}
+
+
+@pytest.mark.parametrize("name", WIDE)
+def test_wide_light_is_the_model_in_every_language(name: str) -> None:
+    """Expected: energies within 1e-4, and values and densities within 1e-3, from both sides, where the plugin draws
+    waves of the azimuth."""
+    if why := MACHINES[name].missing():
+        pytest.skip(why)
+    layers, form = WIDE[name]
+    stack = vt.Stack(layers, thin=True)
+    case = Case(stack, {}, random_case((stack.kinds, "round"), 60, np.random.default_rng(7)).directions)
+    recording = record(stack, form=form)
+    assert "wide_passed[0]" in recording.lobes
+    made = shader(stack, printer=MACHINES[name].printer, form=form)
+    apart = differences(in_numpy(case, recording), on_machine(case, recording, made, MACHINES[name]))
+    assert max(apart.energy, apart.alpha, apart.drawn) < 1e-4
     assert max(apart.value, apart.density) < 1e-3
 
 
@@ -259,6 +290,23 @@ def test_values_that_change_are_those_of_the_program(name: str, pattern: int) ->
     program = Changeable.of(first.stack, machine)
     truth, found = in_numpy(case, program.recording), program.given(case)
     assert differences(truth, replace(found, alpha=truth.alpha)).value < 1e-3
+
+
+def test_a_program_of_clear_panes_draws_frosted_ones() -> None:
+    """Expected: given the values and the solution of a pane that passes light too wide for lobes, and of one that does
+    not. Values count where no sample is as heavy as may be, since densities differ."""
+    if why := MACHINES["wgsl"].missing():
+        pytest.skip(why)
+    clear, frosted = (
+        vt.Stack([vt.Interface(eta=1.5, alpha=x), vt.Interface(eta=1.0, alpha=x)], thin=True) for x in (0.06, 0.3)
+    )
+    program = Changeable.of(clear, MACHINES["wgsl"])
+    for stack in (frosted, clear):
+        case = Case(stack, {}, random_case((stack.kinds, "round"), 60, np.random.default_rng(7)).directions)
+        truth, found = in_numpy(case, program.recording), program.given(case)
+        most = MAX_SAMPLE_WEIGHT * np.minimum(truth.density, found.density)
+        light = (np.where(each.value < 0.98 * most, each.value, 0.0) for each in (truth, found))
+        assert differences(*(replace(truth, value=x) for x in light)).value < 1e-3
 
 
 @pytest.mark.parametrize("name", MACHINES)

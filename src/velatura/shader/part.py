@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from collections import Counter
 from collections.abc import Collection, Hashable, Mapping
 from dataclasses import dataclass
 from functools import cached_property
@@ -156,7 +157,13 @@ def _structs(recording: Recording) -> list[Struct]:
     parts = {last(name): kind for name, kind in kinds.items() if "." in name}
     members = [Field("reflected", "VtLobe", count)] if count else []
     members += [Field("transmitted", "VtLobe")] if "transmitted" in places else []
-    members += [Field(name, kind) for name, kind in kinds.items() if "." not in name]
+    alone = [name for name in kinds if "." not in name]
+    lengths = Counter(name.partition("[")[0] for name in alone)
+    members += [
+        Field(name, kinds[first], lengths[name] if first != name else 0)
+        for first in alone
+        if first in (name := first.partition("[")[0], f"{name}[0]")
+    ]
     lobe = Struct("VtLobe", [Field(name, kind) for name, kind in parts.items()], "rotation in radians")
     lobes = Struct("VtLobes", members, "of light from one direction")
     count = len(recording.energies)

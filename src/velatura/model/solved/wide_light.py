@@ -77,6 +77,14 @@ def columns(
     return narrowed, np.maximum(back, through)
 
 
+def none(found: Columns) -> Columns:
+    """Columns of a side without such light, in the declaration of sides that have some."""
+    assert found.passes
+    nothing = [0 * found.rest, *[0 * found.chance] * wide.COUNT]
+    passes = replace(found.passes, forward=0 * found.chance, narrow=0 * found.chance + 1)
+    return replace(found, passes=passes, wide_reflected=nothing, wide_passed=nothing)
+
+
 def _forward(numbers: Array, i: Direction) -> Array:
     """Shares (M,) of the momentum of light from directions i (M,), about which samples have the same mean momentum as
     light that passes by numbers (COUNT, M)."""

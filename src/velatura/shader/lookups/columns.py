@@ -23,10 +23,10 @@ from velatura.media.tabulated import Tabulated
 from velatura.model import Model
 from velatura.model.base import Body
 from velatura.model.context import Context, at_a_point
-from velatura.model.solved import rotation_frame, solve
+from velatura.model.solved import rotation_frame, solve, wide_light
 from velatura.model.solved.bsdf import Side, Solved
-from velatura.model.solved.columns import Columns
-from velatura.model.solved.lobes import top_medium
+from velatura.model.solved.columns import WIDE_SIDES, Columns
+from velatura.model.solved.lobes import top_medium, wide
 from velatura.model.solved.lobes.remainder import Remainder
 from velatura.model.solved.lobes.top_medium import PassedMedium, TopMedium
 from velatura.model.solved.rotation_frame import Frame, Turned
@@ -34,7 +34,7 @@ from velatura.model.solved.solve import Layout, SolvedSide, Solver
 from velatura.model.solved.transmission import direct
 from velatura.model.solved.transmission.combined import Parts
 from velatura.model.solved.transmission.direct import Transmission
-from velatura.model.variance import Covariance, Variance, is_same
+from velatura.model.variance import Covariance, Isotropic, Variance, is_same
 from velatura.ops import Value
 from velatura.optics import ggx
 from velatura.optics.ggx import Direction
@@ -105,8 +105,11 @@ class SolvedLookUp(LookUp):
             found |= {f"reflected[{k}].{part}": value for part, value in parts.items()}
         found |= {"remainder": columns.scale, "remainder_chance": columns.chance}
         if columns.passes:
-            passed = vars(columns.passes).items()
-            found |= {f"passed_{name}": value for name, value in passed if name not in Parts.OF_WIDE}
+            names = self.straight.above.declaration.parts
+            found |= {f"passed_{name}": getattr(columns.passes, name) for name in names}
+        for side in WIDE_SIDES if columns.wide_passed else ():
+            energy, *numbers = getattr(columns, side)
+            found |= {f"{side}_energy": energy, **{f"{side}[{k}]": x for k, x in enumerate(numbers)}}
         if general and columns.passes and seen.transmission:
             passes = ops.mean(direct.entered(seen.transmission, seen.turned(wi, wi)).passes[0])
             straight = columns.passes.of_straight
@@ -141,10 +144,13 @@ class SolvedLookUp(LookUp):
             solver = replace(solver, grid=replace(solver.grid, cosines=cosines), normals=normals)
         # All that its kind may draw, of its own shape
         own = [_of_kind(layout, kind) for layout, kind in zip(solver.layouts([material]), self.layouts)]
+        solver = replace(solver, wide=solver.wide and wide.share(material) > 0)
         if coarse and solver.model.form == "forward":
             found = solver.solve(material, own[:1]) * self.sides
         else:
             found = solver.solve(material, own)
+        if self.solver.wide and not solver.wide:
+            found = [replace(side, columns=wide_light.none(side.columns)) for side in found]
         texels = _texture(_rows(solver, found), self.places, self.groups, self.nodes)
         degrees = None if self.angle is None else frame.degrees(numbers)
         numbers_of_layout = _layout_numbers(solver, material, own, self.layouts, degrees)
@@ -166,6 +172,7 @@ def tabulated(stack: Stack, material: Material, model: Model, variance: type[Var
     layouts = solver.layouts([_eventful(plain) if general else plain])
     if general and layouts[0].apart and solve.has_one_medium(plain):
         layouts = [replace(layout, alone=True) for layout in layouts]
+    solver = replace(solver, wide=_may_be_wide(plain, layouts[0], variance)) if general else solver.own(plain, layouts)
     found = None if general else solver.solve(plain, layouts)
     rows = None if found is None else _rows(solver, found)
     sides, of_side = [], _colours_of(layouts[0])
@@ -252,6 +259,12 @@ def _of_kind(layout: Layout, kind: Layout) -> Layout:
     return replace(layout, lobes=kind.lobes, top=top, apart=kind.apart, alone=layout.alone and kind.alone)
 
 
+def _may_be_wide(material: Material, layout: Layout, variance: type[Variance]) -> bool:
+    """Whether code of all values draws light that is too wide for lobes: that of panes whose interfaces are written
+    with one roughness."""
+    return material.transmits and len(material.interfaces) > 1 and variance is Isotropic and not layout.apart
+
+
 def _colours_of(layout: Layout) -> int:
     """How many colours a side has: of its remainder and of a medium on top, and of what that passes alone."""
     return (len(fields(Remainder)) + (len(top_medium.ORDERS) if layout.apart else 0)) * (1 + layout.alone)
@@ -299,7 +312,8 @@ def _placed(side: Side, rows: Array | None) -> tuple[Sequence[Group], Sequence[i
     if rows is not None:
         rows = rows.astype(np.float32)
         constants = [float(row.flat[0]) if np.ptp(row) == 0 else None for row in rows]
-        first = [next(k for k, other in enumerate(rows) if np.array_equal(row, other)) for row in rows]
+        alike = ([k for k, other in enumerate(rows) if np.array_equal(row, other)] for row in rows)
+        first = [min(same, key=seldom.__getitem__) for same in alike]
     groups, places, begin = [], dict[int, int](), 0
     for name, wanted in (("columns", 0), ("energies", 1)):
         own = [k for k in range(total) if first[k] == k and constants[k] is None and seldom[k] == wanted]
@@ -335,20 +349,22 @@ class _WeighedSide(Side):
         total = sum(kept) + (through * passes.share if passes else 0.0)
         chances = [ops.divide(x, total) for x in kept]
         if passes:
-            weights = [through * x for x in (passes.straight, passes.bounced, passes.rest)]
-            parts = (passes.of_straight, passes.of_bounced, passes.of_rest)
-            passes = Parts(*weights, *(ops.divide(through * x, total) for x in parts), *passes.numbers)
-        return Columns(
-            [x * weight for x, weight in zip(lobes, columns.weights)],
-            columns.roughness,
-            chances[:-1],
-            [x * energy for x, energy in zip(lobes, columns.energies)],
-            rest * columns.scale,
-            chances[-1],
-            rest * columns.rest,
-            passes,
-            None if columns.passed is None else through * columns.passed,
-            columns.of_top,
+            weights = {name: through * getattr(passes, name) for name in Parts.COLOURS}
+            shares = {name: ops.divide(through * getattr(passes, name), total) for name in Parts.CHANCES}
+            passes = replace(passes, **weights, **shares)
+        reflected, passed = columns.wide_reflected, columns.wide_passed
+        return replace(
+            columns,
+            weights=[x * weight for x, weight in zip(lobes, columns.weights)],
+            chances=chances[:-1],
+            energies=[x * energy for x, energy in zip(lobes, columns.energies)],
+            scale=rest * columns.scale,
+            chance=chances[-1],
+            rest=rest * columns.rest,
+            passes=passes,
+            passed=None if columns.passed is None else through * columns.passed,
+            wide_reflected=[*(rest * energy for energy in reflected[:1]), *reflected[1:]],
+            wide_passed=[*(through * energy for energy in passed[:1]), *passed[1:]],
         )
 
 

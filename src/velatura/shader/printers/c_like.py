@@ -268,7 +268,8 @@ class CLike(Printer):
         return f"{declared}\n{self.spelled(_TEXELS + ''.join(map(_table, layouts)))}"
 
     def baked_texture(self, width: int, height: int) -> str:
-        return _LOBES.format(self.texels_of, width, height) + self.texture("vt_baked", TABLES)
+        kilobytes = round(width * height * (8 if self.half else 16) / 1000)
+        return _LOBES.format(self.texels_of, width, height, kilobytes) + self.texture("vt_baked", TABLES)
 
     def lookup(self, bake: LookUp, first: int) -> str:
         line = f"y + {first}" if first else "y"
@@ -466,7 +467,7 @@ float vt_volume(int start, ivec3 nodes, vec3 at) {{
 """
 
 _LOBES = """\
-// The lobes over direction: {}, {} x {} texels, never filtered
+// The lobes over direction: {}, {} x {} texels ({} kB), never filtered
 """
 
 _BAKED = {
