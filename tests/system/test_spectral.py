@@ -22,7 +22,17 @@ import drjit as dr  # noqa: E402
 
 pytestmark = pytest.mark.usefixtures("one_thread")
 
-NAMED = ("coated-gold", "frosted-glass", "varnished-paint")
+
+def pane(absorption: float | tuple[float, float, float]) -> vt.Stack:
+    """A pane that light passes too wide for lobes."""
+    medium = vt.Medium(depth=1.0, sigma_a=absorption)
+    return vt.Stack([vt.Interface(eta=1.5, alpha=0.4), medium, vt.Interface(eta=1.0, alpha=0.3)], thin=True)
+
+
+MATERIALS = {
+    **{name: vt.preset(name) for name in ("coated-gold", "frosted-glass", "varnished-paint")},
+    "wide pane": pane((0.1, 0.5, 1.0)),
+}
 WI, WO = (0.5, 0.2, 0.8), (-0.45, -0.25, 0.75)
 RAYS = ((400.0, 450.0, 500.0, 550.0), (600.0, 650.0, 700.0, 750.0))
 
@@ -94,9 +104,9 @@ def test_sampling_follows_the_density(name: str) -> None:
         assert test.run(0.01, 6), f"{name} at cosine {cosine}"
 
 
-@pytest.mark.parametrize("name", NAMED)
+@pytest.mark.parametrize("name", MATERIALS)
 def test_eval_pdf_and_sample_agree(name: str) -> None:
-    bsdf, ctx, n = vt.bsdf(name), mi.BSDFContext(), 5000
+    bsdf, ctx, n = vt.bsdf(MATERIALS[name]), mi.BSDFContext(), 5000
     rng = np.random.default_rng(3)
     si = seen(WI, RAYS[0], n)
     bs, weight = bsdf.sample(ctx, si, mi.Float(rng.random(n)), mi.Point2f(rng.random((2, n))))
@@ -106,14 +116,20 @@ def test_eval_pdf_and_sample_agree(name: str) -> None:
     assert np.allclose(np.array(weight) * np.array(pdf), value, rtol=1e-3, atol=1e-6)
 
 
-@pytest.mark.parametrize("name", NAMED)
+@pytest.mark.parametrize("name", MATERIALS)
 def test_shapes_do_not_depend_on_the_wavelengths_of_a_ray(name: str) -> None:
     """Expected: the same densities and the same samples, to the last bit, and values that differ."""
-    bsdf, ctx, n = vt.bsdf(name), mi.BSDFContext(), 1000
+    bsdf, ctx, n = vt.bsdf(MATERIALS[name]), mi.BSDFContext(), 1000
     u = np.random.default_rng(7).random((3, n))
     one, other = (bsdf.sample(ctx, seen(WI, ray, n), mi.Float(u[0]), mi.Point2f(u[1:])) for ray in RAYS)
     assert np.array_equal(one[0].wo, other[0].wo) and np.array_equal(one[0].pdf, other[0].pdf)
     assert not np.allclose(one[1], other[1], rtol=1e-3)
+
+
+def test_wide_light_of_grey_panes_is_that_of_rgb() -> None:
+    for wo in (WO, (-0.3, 0.4, -0.7)):
+        rays = vt.bsdf(pane(0.3)).eval(mi.BSDFContext(), seen(WI, RAYS[0]), towards(wo))
+        np.testing.assert_allclose(np.array(rays).ravel(), in_rgb(pane(0.3), WI, wo)[0], rtol=1e-5)
 
 
 def test_a_texture_of_one_value_is_that_value() -> None:

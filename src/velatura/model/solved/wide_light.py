@@ -54,7 +54,7 @@ def columns(
     `INCIDENCES`.
     """
     assert found.passes and found.passed is not None
-    beyond, passing = (np.mean(each, axis=0)[..., len(INCIDENCES) :] for each in (light.beyond, light.passing))
+    beyond, passing = (ops.mean(each)[..., len(INCIDENCES) :] for each in (light.beyond, light.passing))
     z = cosines(folded)
     wi = np.sqrt(1 - z * z), 0 * z, z
     bound = float(ops.mean(internal_reflections.bound(transmission)))
