@@ -26,6 +26,13 @@ def test_packed_functions_are_those_that_were_given(shared: bool, sizes: list[in
     np.testing.assert_allclose(packed.at(np.sqrt(w[2])), expected, rtol=1e-12)
 
 
+def test_functions_that_are_alike_by_chance_are_several() -> None:
+    row = RNG.uniform(size=SHAPE).astype(np.float32).astype(float)
+    rows = np.array([row, row * (1 + 1e-9), row * (1 + 1e-15)])
+    assert (rows.astype(np.float32) == rows[0].astype(np.float32)).all()
+    assert Packing.of(rows, [0, 0, 0]).places == (0, 1, 0)
+
+
 def test_functions_that_are_sums_of_few() -> None:
     few, shares = RNG.uniform(size=(2, *SHAPE)), RNG.uniform(size=(2, 5))
     packing = Packing.of(few, [0, 0])

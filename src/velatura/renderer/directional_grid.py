@@ -19,6 +19,7 @@ from velatura.renderer.low_discrepancy import integers
 from velatura.renderer.packets import Packets, packets
 
 LINE = (512,)  # nodes, where functions depend on the cosine alone
+SAME = 1e-12  # ratio, from 1, of values of functions that are one
 SINE_MIN = 1e-6  # so that there is an azimuth at the normal
 PLANE = (64, 33)  # nodes over the cosine and the azimuth; the latter one more than a multiple of four
 
@@ -55,16 +56,16 @@ class Packing:
     @classmethod
     def of(cls, rows: NDArray[np.floating], groups: Sequence[int], shared: bool = True) -> Packing:
         """Packing of values (rows, ...), each group in a table of its own; `shared` where the same ones are one."""
-        keys = [
-            (group, row.astype(np.float32).tobytes() if shared else k)
-            for k, (group, row) in enumerate(zip(groups, rows))
-        ]
         first: dict[Any, int] = {}
-        for k, key in enumerate(keys):
-            first.setdefault(key, k)
-        tables = [tuple(k for (each, _), k in first.items() if each == group) for group in sorted({*groups})]
+        own = [*range(len(rows))]
+        for k, row in enumerate(rows if shared else ()):
+            like = first.setdefault((groups[k], row.astype(np.float32).tobytes()), k)
+            # Those that are alike by chance, to single precision, would have another kernel than their neighbours
+            if (np.abs(row - rows[like]) <= SAME * np.abs(row)).all():
+                own[k] = like
+        tables = [tuple(k for k in sorted({*own}) if groups[k] == group) for group in sorted({*groups})]
         order = [k for table in tables for k in table]
-        return cls(tuple(tables), tuple(order.index(first[key]) for key in keys))
+        return cls(tuple(tables), tuple(map(order.index, own)))
 
     def split(self, values: NDArray[np.floating], axis: int = 0) -> list[NDArray[np.floating]]:
         """The values of each table, with functions along an axis."""
