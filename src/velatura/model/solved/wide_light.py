@@ -20,7 +20,7 @@ from velatura.model.solved.columns import Columns
 from velatura.model.solved.energies.energies import INCIDENCES, Energies
 from velatura.model.solved.grid import Folded, Listed
 from velatura.model.solved.lobes import wide
-from velatura.model.solved.transmission import forward, internal_reflections
+from velatura.model.solved.transmission import direct, forward, internal_reflections
 from velatura.model.solved.transmission.combined import Parts
 from velatura.model.solved.transmission.direct import Transmission
 from velatura.optics.ggx import Direction
@@ -106,14 +106,16 @@ def shared(found: Columns, shares: Array, view: View, folded: Folded | Listed) -
     first = np.unique(cosine, return_index=True)[1]
     x, y, z = (np.tile(each, len(first)) for each in low_discrepancy.even_in_projection(EVENLY))
     of, i = view(np.repeat(first, EVENLY))
-    assert of.columns.passes
+    assert of.columns.passes and of.transmission
     alone = {name: row[:, None] for name, row in zip(Parts.CHANCES, np.eye(len(Parts.CHANCES)))}
     each = replace(of, columns=replace(of.columns, passes=replace(of.columns.passes, **alone)))
     parts = [of.part(k, i, (x, y, z)) for k in range(len(of.chances))]
-    mirrored, passed = (each.through(i, (x, y, sign * z)) for sign in (1, -1))
-    values = sum(value for value, _ in parts), passed[0]
+    through, passed = each.through(i, (x, y, -z))
+    # On the side of the light are samples of what passes that facets reflect
+    mirrored = alone["of_straight"] * direct.eval_pdf(of.transmission, i, (x, y, z))[1]
+    values = sum(value for value, _ in parts), through
     kept = sum(chance * density for chance, (_, density) in zip(of.columns.chances, parts)), 0 * z
-    densities = [(parts[-1][1], 0 * z), *zip(mirrored[1], passed[1])]
+    densities = [(parts[-1][1], 0 * z), *zip(mirrored, passed)]
 
     def both(above: Array, below: Array) -> Array:
         return np.concatenate([np.reshape(values, (len(first), -1)) for values in (above, below)], axis=-1)

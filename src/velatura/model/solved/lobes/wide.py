@@ -24,6 +24,7 @@ from numpy.typing import NDArray
 from velatura import ops
 from velatura.model import fitted
 from velatura.model.guards import ALPHA_MIN
+from velatura.model.solved.energies.matrices import applied
 from velatura.model.solved.energies.nodes import QUADRATURE, Nodes
 from velatura.model.solved.guards import ALBEDO_MIN
 from velatura.model.solved.lobes.remainder import EXACT, KEPT
@@ -69,6 +70,11 @@ def _smooth(x: Any, ends: tuple[float, float]) -> Any:
 
 def density(numbers: Sequence[Value], i: Direction, o: Direction) -> Value:
     """pi f(wi, wo) over its mean, of directions above."""
+    return ops.maximum(_unclipped(numbers, i, o), 0.0)
+
+
+def _unclipped(numbers: Sequence[Value], i: Direction, o: Direction) -> Value:
+    """The same where it is more than 0: linear in the numbers, those of a wave m times |p_i|^m."""
     s = -1 * (i[0] * o[0] + i[1] * o[1])
     squares = (i[0] * i[0] + i[1] * i[1]) * (o[0] * o[0] + o[1] * o[1])
     found: Value = 0.0
@@ -79,7 +85,7 @@ def density(numbers: Sequence[Value], i: Direction, o: Direction) -> Value:
         term = sum(next(each) * polynomial for polynomial in polynomials[:terms])
         found = found + wave * term if m else term
         wave, before = (s, 1.0) if m == 0 else (2 * s * wave - squares * before, wave)
-    return ops.maximum(found, 0.0)
+    return found
 
 
 def _legendre(z: Value) -> list[Value]:
@@ -119,12 +125,20 @@ def fit(nodes: Nodes, measures: Array, n: float, sines: Array) -> tuple[Array, A
             numbers = np.where(sines < sines[0], numbers[:, :1], numbers)
         found.append(numbers[:, 1:])
     numbers, sines = np.concatenate(found), sines[1:]
+    orders = np.repeat(np.arange(len(TERMS)), TERMS)[:, None]
+    light = applied(_evenly()[None, None], (numbers * sines**orders)[None, None])[0, 0]
+    mean = np.maximum(light, 0).mean(axis=0)
+    return np.asarray(numbers / np.maximum(mean, ALBEDO_MIN)), _resolved(np.array(errors), *lengths[-2:])[1:]
+
+
+@functools.cache
+def _evenly() -> Array:
+    """What each number adds to light of the length 1 of momentum in directions that are even in projection,
+    (EVENLY, COUNT)."""
     cosine, turn = low_discrepancy.fibonacci(EVENLY)
     radius, phi = np.sqrt(1 - cosine), 2 * pi * turn
-    evenly = radius * np.cos(phi), radius * np.sin(phi), np.sqrt(cosine)
-    i = sines[:, None], 0 * sines[:, None], np.sqrt(1 - sines * sines)[:, None]
-    mean = density([*numbers[..., None]], i, evenly).mean(axis=-1)
-    return np.asarray(numbers / np.maximum(mean, ALBEDO_MIN)), _resolved(np.array(errors), *lengths[-2:])[1:]
+    o = radius * np.cos(phi), radius * np.sin(phi), np.sqrt(cosine)
+    return np.asarray(_unclipped([*np.eye(COUNT)[..., None]], (1.0, 0.0, 0.0), o)).T
 
 
 def _resolved(errors: Array, before: Array, last: Array) -> Array:
