@@ -23,6 +23,11 @@ COATED = vt.Stack(
 )
 PANE = vt.Stack([vt.Interface(eta=1.5, alpha=0.1), vt.Interface(eta=1.3, alpha=0.2)])
 BRUSHED = vt.Stack([vt.Interface(eta=0.2, k=3.9, alpha=(0.3, 0.15), rotation=20)])
+MIRROR = vt.Interface(conductor="mirror", alpha=0.5)
+MATCHED = {  # with a medium that has the index of the outside
+    "bare": vt.Stack([vt.Interface(eta=1.0), MIRROR]),
+    "dust": vt.Stack([vt.Medium(depth=0.3, sigma_a=1.0, sigma_s=1.0), vt.Interface(eta=1.0), MIRROR]),
+}
 ROUND = vt.Stack([vt.Interface(conductor="mirror", alpha=0.2)])
 UP, DOWN = (-0.45, -0.15, 0.75), (-0.45, -0.15, -0.75)
 
@@ -79,6 +84,20 @@ def test_gradients_are_differences(stack: vt.Stack, keys: str, wo: tuple[float, 
     dr.backward(value(bsdf, wo))
     for key, variable in variables.items():
         np.testing.assert_allclose(np.array(dr.grad(variable)).ravel(), difference(stack, key, wo), rtol=0.02)
+
+
+@pytest.mark.parametrize("stack", MATCHED.values(), ids=MATCHED)
+def test_a_gradient_by_the_index_of_the_outside_is_the_slope_towards_denser_media(stack: vt.Stack) -> None:
+    """Light has a kink there: lobes and their columns are to have the slope of the same side, to 5 % over 2 %."""
+    (key,) = (name for name in stack.flat() if name.endswith("_eta"))
+    bsdf, eta = vt.bsdf(stack), mi.Float(1.0)
+    parameters = mi.traverse(bsdf)
+    dr.enable_grad(eta)
+    parameters[key] = eta
+    parameters.update()
+    dr.backward(value(bsdf, UP))
+    same, denser = (float(value(vt.bsdf(stack.replace(**{key: x})), UP)[0]) for x in (1.0, 1.02))
+    assert float(dr.grad(eta)[0]) == pytest.approx((denser - same) / 0.02, rel=0.05)
 
 
 def test_one_variable_for_both_axes_leaves_an_interface_isotropic(monkeypatch: pytest.MonkeyPatch) -> None:

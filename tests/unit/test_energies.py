@@ -51,13 +51,15 @@ def test_nodes_lie_where_media_end() -> None:
 
 
 def test_a_step_of_an_index_keeps_the_number_of_nodes() -> None:
-    """Where it would change by itself; where a part would be too short, nodes are those of the indices alone."""
+    """Where it would change by itself; where a part would be too short, or where one medium stands beside another of
+    the same index, nodes are those of the indices alone."""
     like = [1.0, 1.6912, 1.3]
     steps = [Nodes.of([1.0, like[1] + step, 1.3], 24) for step in (-0.03, 0.03)]
     held = [Nodes.of([1.0, like[1] + step, 1.3], 24, like) for step in (-0.03, 0.03)]
     assert steps[0].cells != steps[1].cells
     assert held[0].cells == held[1].cells == Nodes.of(like, 24).cells and held[0].ends == steps[0].ends
     assert Nodes.of([1.0, 1.30001, 1.3], 24, like) == Nodes.of([1.0, 1.30001, 1.3], 24)
+    assert Nodes.of([1.0, 1.02, 1.3], 24, [1.0, 1.0, 1.3]) == Nodes.of([1.0, 1.02, 1.3], 24)
 
 
 @pytest.mark.parametrize("index", [1.0, 1.3])

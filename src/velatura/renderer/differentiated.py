@@ -2,16 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from velatura import kernel
 from velatura.ops import Value
 from velatura.renderer import finite_differences
-from velatura.stack import Address, Material
+from velatura.stack import Address, InterfaceValues, Material
+from velatura.stack.chain import chain
 
 # Steps over a value; those of films are small to phases
 RELATIVES = {"alpha_u": 0.06, "alpha_v": 0.06, "rotation": 0.0, "film_thickness_nm": 0.0, "film_eta": 0.004}
@@ -23,27 +25,52 @@ STEPS = {
     "film_thickness_nm": 3.0,
 }  # least; rotations are in degrees
 STEP = 0.005
+INDICES = "eta", "exterior"  # roles of values that media are rarer or denser by
+ROUNDED = 1e-6  # share of an index that means of colours are off by
 
 
 @dataclass(frozen=True)
 class Variables:
-    """Differentiated numbers of a material, each with the values, and their channel, that it stands for."""
+    """Differentiated numbers of a material, each with the values, and their channel, that it stands for; the material
+    in NumPy, `start`."""
 
     given: list[finite_differences.DifferentiatedNumber]
     addresses: list[Address]
+    start: Material
 
     @classmethod
     def of(cls, material: Material) -> Variables:
         """The numbers that are differentiated among a renderer's values."""
         addresses, values = zip(*material.values())
-        return cls(finite_differences.variables(values), list(addresses))
+        return cls(finite_differences.variables(values), list(addresses), plain(material))
 
     def around(self, k: int, x: float) -> tuple[float, float]:
         """Numbers a step below and above that of the k-th variable, x, within the range."""
         address = self.addresses[self.given[k].places[0][0]]
         low, high = address.declared.within
         step = max(RELATIVES.get(address.role, RELATIVE) * abs(x), STEPS.get(address.role, STEP))
-        return max(x - step, low), min(x + step, high)
+        ends = max(x - step, low), min(x + step, high)
+        if address.role not in INDICES:
+            return ends
+        # Light has a kink where a medium gets rarer than the outside, and shapes have the slope of its denser side
+        denser = _denser(self.start)
+        low, high = (x if np.any(denser & ~_denser(self._with(self.start, k, end))) else end for end in ends)
+        return (low, high) if low < high else ends
+
+    def ends(self, material: Material) -> Iterator[Material]:
+        """A material of NumPy's values with the numbers at both ends of the step of each variable."""
+        for k, x in enumerate(self._numbers):
+            yield from (self._with(material, k, end) for end in self.around(k, x))
+
+    @property
+    def _numbers(self) -> list[float]:
+        values = [np.ravel(value) for _, value in self.start.values()]
+        return [float(values[k][channel]) for k, channel in (variable.places[0] for variable in self.given)]
+
+    def _with(self, material: Material, k: int, x: float) -> Material:
+        """A material of NumPy's values with x for the k-th variable."""
+        numbers = self._numbers
+        return self.replaced(material, [*numbers[:k], x, *numbers[k + 1 :]])
 
     def replaced(self, material: Material, numbers: Sequence[float]) -> Material:
         """The material of NumPy's values, floats or colours (C, 1), with these numbers of the variables."""
@@ -64,6 +91,15 @@ class Variables:
             return colour
 
         return material.each(value)
+
+
+def _denser(material: Material) -> NDArray[np.bool_]:
+    """Whether each medium that light leaves by an interface is no rarer than the outside, seen from either side."""
+    found = []
+    for seen in [material, material.reversed()] if material.transmits else [material]:
+        outside = (1 - ROUNDED) * np.mean(seen.exterior)
+        found += [np.mean(each.above) >= outside for each in chain(seen) if isinstance(each.layer, InterfaceValues)]
+    return np.array(found, bool)
 
 
 def plain(material: Material) -> Material:

@@ -618,7 +618,7 @@ def solve(material: Material, model: Model, variance: type[Variance], context: C
     material = material.solid()
     start, given = plain(material), Variables.of(material)
     solver = Solver.of(model, variance, context, start)
-    layouts = solver.layouts([start])
+    layouts = solver.layouts([start, *given.ends(start)])
     solver = solver.own(start, layouts)
 
     packings: list[Packing] = []

@@ -108,7 +108,7 @@ def solve(material: Material, places: Array, model: Model, variance: type[Varian
     material = replace(material, light=_channels(material.light, chosen))
     given, start = Variables.of(material), plain(material)
     solver = Solver.over(len(places), model, variance, context, start)
-    layouts = solver.layouts([start])
+    layouts = solver.layouts([start, *given.ends(start)])
     solver = solver.own(start, layouts)
     declared: list[Declaration] = []
 

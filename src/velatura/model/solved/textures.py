@@ -248,7 +248,8 @@ def _tabulated(
         return before
     groups = _groups(spanned, together if isotropic else 1)
     ends = product(*((axis.values[0], axis.values[-1]) for axis in spanned))
-    layouts = solver.layouts([start, *(texture_axes.placed(start, spanned, values) for values in ends)])
+    corners = [texture_axes.placed(start, spanned, values) for values in ends]
+    layouts = solver.layouts([start, *corners, *given.ends(start)])
 
     reads: list[list[int]] = []
 

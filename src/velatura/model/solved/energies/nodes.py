@@ -49,7 +49,8 @@ class Nodes:
     @classmethod
     def of(cls, indices: Sequence[float], count: int, like: Sequence[float] | None = None) -> Nodes:
         """Nodes for media of such indices, about `count` for two. Given media `like` these, as many as for them on each
-        part, so that results do not jump from one to the other, unless that leaves a part too short."""
+        part, so that results do not jump from one to the other, unless that leaves a part too short, or one medium
+        within another's part, where no part ends at its total reflection."""
         if like is None or len(like) != len(indices):
             like = indices
         media, close = _apart(like, CLOSE), CLOSE
@@ -57,7 +58,7 @@ class Nodes:
             close *= WIDER
             media = _apart(like, close)
         ends, known = ([0.0, *(float(n[k]) for k in media[:-1]), float(max(n))] for n in (indices, like))
-        if any(b < a * CLOSE for a, b in pairwise(ends[1:])):
+        if len(_apart(indices, close)) > len(media) or any(b < a * CLOSE for a, b in pairwise(ends[1:])):
             return cls.of(indices, count)
         if len(ends) == 2:
             return cls(tuple(ends), (count - 1,))
