@@ -87,14 +87,14 @@ def show(found: Fit, output: Path | None, picture: Path | None, as_json: bool, o
         walked = {"model_error": vars(own)} if own else {}
         print(json.dumps({"model": found.model.name, **found.to_dict(), **walked}, allow_nan=False))
         return
-    report(found)
+    report(found, own)
     invert.say_for_which(found.model)
     print(output if output else dumps(found.stack, "yaml"), end="\n" if output else "")
     if picture:
         print(picture)
 
 
-def report(found: Fit) -> None:
+def report(found: Fit, own: ModelError | None = None) -> None:
     """Print errors, energies, parameters and other stacks of a fit."""
     console = options.console()
     of = "log(1 + f cos), and ten times of energies" if found.energies else "log(1 + f cos)"
