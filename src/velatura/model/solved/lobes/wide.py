@@ -133,8 +133,7 @@ def fit(nodes: Nodes, measures: Array, n: float, sines: Array) -> tuple[Array, A
 
 @functools.cache
 def _evenly() -> Array:
-    """What each number adds to light of the length 1 of momentum in directions that are even in projection,
-    (EVENLY, COUNT)."""
+    """Light of each number at the length 1 of momentum, in directions that are even in projection: (EVENLY, COUNT)."""
     cosine, turn = low_discrepancy.fibonacci(EVENLY)
     radius, phi = np.sqrt(1 - cosine), 2 * pi * turn
     o = radius * np.cos(phi), radius * np.sin(phi), np.sqrt(cosine)
