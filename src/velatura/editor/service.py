@@ -118,7 +118,11 @@ def _constants() -> Answer:
         "presets": [_preset(name) for name in presets(mixtures=False)],
         "models": [_model(model) for model in MODELS],
         "default_model": DEFAULT,
-        "formats": [{"name": name, "fixed": "constant" in format.options} for name, format in exports.FORMATS.items()],
+        "formats": [
+            {"name": name, "fixed": "constant" in format.options}
+            for name, format in exports.FORMATS.items()
+            if format.is_text
+        ],
         "names": _names(),
         "objects": list(OBJECTS),
         "environments": [{"name": name, "title": _titled(name), "url": url} for name, url in environments],

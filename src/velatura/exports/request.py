@@ -49,6 +49,7 @@ class Request:
 class Export:
     """A text, and the files that belong beside it, by ending: `.tables.bin` is `gold.tables.bin` beside `gold.glsl`.
 
+    data: the file itself in a format that is no text, which then is empty.
     costs: of code, what a call of each function costs, in words; notes: of parameters, what is lost, in
     sentences; of code, shared tables that it does not read.
     apart: files that several exports share, by path.
@@ -59,6 +60,7 @@ class Export:
     costs: Mapping[str, str] = field(default_factory=dict)
     notes: tuple[str, ...] = ()
     apart: Mapping[Path, bytes] = field(default_factory=dict)
+    data: bytes | None = None
 
     def save(self, path: str | Path) -> list[Path]:
         """Write the text to a file, and what belongs beside it; the files that were written, that of the text first.
@@ -72,7 +74,7 @@ class Export:
             with files.whole(other) as unfinished:
                 unfinished.write_bytes(data)
         with files.whole(path) as unfinished:
-            unfinished.write_text(self.text, encoding="utf-8")
+            unfinished.write_bytes(self.text.encode() if self.data is None else self.data)
         return [path, *others]
 
 
