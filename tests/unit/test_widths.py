@@ -27,6 +27,10 @@ def found(*layers: Any) -> list[Part]:
     return parts(Material.of(Stack(list(layers))))
 
 
+def roughnesses(layers: list[Part], cosines: Array, phi: Array, energies: Array) -> list[Roughness]:
+    return [tensor.roughness(phi) for tensor in widths.tensors(layers, cosines, phi, energies)]
+
+
 def smooth_energies(*layers: Any) -> Array:
     """Of lobes of interfaces that are smooth, without what goes back and forth, (K, 3)."""
     share, energies = np.ones(3), []
@@ -42,7 +46,7 @@ def smooth_energies(*layers: Any) -> Array:
 
 def test_the_first_lobe_has_the_roughness_of_its_interface() -> None:
     only = found(Interface(eta=1.5, alpha=(0.1, 0.4), rotation=25))
-    (lobe,) = widths.roughnesses(only, COSINES, np.array([0.0, 1.0, 2.0]), np.full((1, 3), 0.1))
+    (lobe,) = roughnesses(only, COSINES, np.array([0.0, 1.0, 2.0]), np.full((1, 3), 0.1))
     np.testing.assert_allclose([lobe.alpha_u, lobe.alpha_v], np.array([[0.4], [0.1]]).repeat(3, 1), rtol=1e-9)
     np.testing.assert_allclose(np.cos(2 * (lobe.rotation - np.radians(115))), 1)
 
@@ -50,7 +54,7 @@ def test_the_first_lobe_has_the_roughness_of_its_interface() -> None:
 @pytest.mark.parametrize("coat", [Interface(eta=1.0, alpha=0.4), Interface(eta=1.0001, alpha=0.4)])
 def test_a_coat_of_the_index_outside_changes_nothing(coat: Interface) -> None:
     layers = coat, Interface(eta=0.2, k=3.0, alpha=(0.3, 0.1), rotation=70)
-    _, lobe = widths.roughnesses(found(*layers), COSINES, 0 * COSINES, smooth_energies(*layers))
+    _, lobe = roughnesses(found(*layers), COSINES, 0 * COSINES, smooth_energies(*layers))
     np.testing.assert_allclose(lobe.alpha_u, 0.3, rtol=3e-3)
     np.testing.assert_allclose(lobe.alpha_v, 0.1, rtol=3e-3)
     np.testing.assert_allclose(np.cos(2 * (lobe.rotation - np.radians(70))), 1)
@@ -63,8 +67,8 @@ def test_a_tinted_medium_leaves_the_width_of_a_lobe_alone() -> None:
     energies = smooth_energies(coat, metal)
     inside = np.sqrt(1 - (1 - COSINES**2) / 1.5**2)
     kept = np.exp(-2 * np.array(tint.sigma_a)[:, None] / inside).mean(axis=0)
-    clear = widths.roughnesses(found(coat, metal), COSINES, 0 * COSINES, energies)
-    tinted = widths.roughnesses(found(coat, tint, metal), COSINES, 0 * COSINES, energies * [1 + 0 * kept, kept])
+    clear = roughnesses(found(coat, metal), COSINES, 0 * COSINES, energies)
+    tinted = roughnesses(found(coat, tint, metal), COSINES, 0 * COSINES, energies * [1 + 0 * kept, kept])
     np.testing.assert_allclose(tinted[1], clear[1], rtol=1e-9)
 
 
@@ -75,7 +79,7 @@ def test_turning_all_layers_turns_all_lobes() -> None:
         coat = Interface(eta=1.5, alpha=(0.1, 0.3), rotation=20 + turn)
         base = Interface(eta=0.2, k=3.0, alpha=(0.4, 0.05), rotation=-50 + turn)
         azimuths = np.full(3, np.radians(phi))
-        lobe = widths.roughnesses(found(coat, base), COSINES, azimuths, np.array([[0.05] * 3, [0.6] * 3]))[1]
+        lobe = roughnesses(found(coat, base), COSINES, azimuths, np.array([[0.05] * 3, [0.6] * 3]))[1]
         tensor = widths.Tensor.turned(lobe.alpha_u, lobe.alpha_v, lobe.rotation - np.radians(turn))
         return np.array([tensor.xx, tensor.xy, tensor.yy])
 
@@ -93,7 +97,7 @@ def test_widths_are_finite_at_the_ends() -> None:
                 Interface(eta=1.6, alpha=alpha), Interface(eta=eta, alpha=alpha), Interface(eta=1.6, alpha=0.0)
             )
             for energy in (0.0, 0.3):
-                for lobe in widths.roughnesses(layers, cosines, 0 * cosines, np.full((3, 3), energy)):
+                for lobe in roughnesses(layers, cosines, 0 * cosines, np.full((3, 3), energy)):
                     assert all(np.isfinite(x).all() for x in lobe)
                     assert np.all(np.maximum(lobe.alpha_u, lobe.alpha_v) <= 1)
 
@@ -145,7 +149,7 @@ def test_lobes_are_as_wide_as_walks(name: str) -> None:
     truth = vt.reference.distribution(Stack(layers), cosines, 0.0, 400_000, 1, bins=bins).reflected.mean(axis=0)
     energies = np.array([energy.mean(axis=0) for energy in walked.energy])
     layers_found = found(*layers)
-    shapes = widths.roughnesses(layers_found, cosines, 0 * cosines, energies)
+    shapes = roughnesses(layers_found, cosines, 0 * cosines, energies)
     for i, cosine in enumerate(cosines):
         light = np.zeros((bins, bins))
         n = 1.0

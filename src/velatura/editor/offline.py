@@ -277,8 +277,3 @@ def _tables(names: Iterable[str]) -> dict[str, bytes]:
 def packed(answer: Any) -> bytes:
     """An answer as a file holds it."""
     return gzip.compress(json.dumps(answer, allow_nan=False, separators=(",", ":")).encode(), mtime=0)
-
-
-def unpacked(data: bytes) -> Any:
-    """The answer in a file."""
-    return json.loads(gzip.decompress(data))

@@ -172,19 +172,14 @@ def first_step(steps: Sequence[float]) -> int | None:
     return next(iter(stepped(steps)), None)
 
 
-def roughnesses(found: Sequence[Part], cos_theta: Array, phi: Array, energies: Array) -> list[Roughness]:
-    """The roughness of the lobe of each interface in the medium above it, from the top.
+def tensors(found: Sequence[Part], cos_theta: Array, phi: Array, energies: Array) -> list[Tensor]:
+    """Roughness of the lobe of each interface in the medium above it, from the top, in the plane of incidence.
 
     Args:
-        found: the layers, as `transport.parts` has them.
+        found: the layers, as `energies.adding.parts` has them.
         cos_theta, phi: of the directions, (M,).
         energies: of the lobes (K, M), means over colours.
     """
-    return [tensor.roughness(phi) for tensor in tensors(found, cos_theta, phi, energies)]
-
-
-def tensors(found: Sequence[Part], cos_theta: Array, phi: Array, energies: Array) -> list[Tensor]:
-    """Tensors of `roughnesses`, in the plane of incidence."""
     result: list[Tensor] = []
     coats: list[_Coat] = []
     share = np.ones((1, len(cos_theta)))
