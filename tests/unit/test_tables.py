@@ -26,7 +26,7 @@ DEFAULT = {
     *("dielectric_multi", "conductor_multi", "inside_multi", "absorbing_inside_multi"),
     *("tir_published", "tir_published_outside"),
 }
-OTHER = {"dielectric", "conductor", "inside", "absorbing_inside", "tir_clean", "drawn"}
+OTHER = {"dielectric", "conductor", "inside", "absorbing_inside", "tir_clean"}
 OVER_A_DIFFUSE_BASE = {"entering", "returning", "passing", "staying"}
 SHIPPED = tables.load()
 MAKERS = makers()

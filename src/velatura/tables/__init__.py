@@ -1,6 +1,5 @@
 """Averages of Fresnel over GGX interfaces: integrated, compressed, stored, looked up."""
 
-from velatura.tables.anisotropic_albedo import drawn_albedo
 from velatura.tables.fetch import (
     Row,
     conductor_row,
@@ -25,7 +24,6 @@ __all__ = [
     "Tables",
     "conductor_row",
     "dielectric_row",
-    "drawn_albedo",
     "fgd",
     "fgd_sheet",
     "load",

@@ -46,7 +46,6 @@ class Tables:
     tir_published: Table
     tir_published_outside: Table
     tir_clean: Table
-    drawn: Table
     entering: Table
     returning: Table
     passing: Table

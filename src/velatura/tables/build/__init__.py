@@ -10,10 +10,6 @@ Of single reflections (`single_scattering`):
     tir_published_outside   its U at 8 angles, for relative indices above 1
     tir_clean               energy fraction reflected within the critical cone
 
-Of lobes with two roughnesses (`anisotropic_albedo`):
-
-    drawn                   the albedo of a mirror, over the cosine and both roughnesses
-
 Of light that may bounce between the facets (`multiple_scattering`), as U at angles where Fresnel is raised to powers:
 
     dielectric_multi        14 channels, for relative indices above 1
@@ -33,7 +29,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from time import perf_counter
 
-from velatura.tables.build import anisotropic_albedo, diffuse_matrices, multiple_scattering, single_scattering
+from velatura.tables.build import diffuse_matrices, multiple_scattering, single_scattering
 from velatura.tables.build.quadrature import Progress, ignore
 from velatura.tables.store import Table, Tables
 
@@ -65,5 +61,5 @@ def build(progress: Progress = ignore) -> Built:
 
 def makers() -> dict[str, Callable[[Progress], Table]]:
     """The functions that make the tables, by name."""
-    parts = single_scattering, anisotropic_albedo, multiple_scattering, diffuse_matrices
+    parts = single_scattering, multiple_scattering, diffuse_matrices
     return {name: make for part in parts for name, make in part.makers().items()}

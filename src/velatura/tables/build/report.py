@@ -9,9 +9,8 @@ from typing import Any
 import numpy as np
 
 from velatura.optics import fresnel
-from velatura.tables import anisotropic_albedo, diffuse_nodes, microsurface_walks
+from velatura.tables import diffuse_nodes, microsurface_walks
 from velatura.tables.build import belcour_grid, build, diffuse_matrices
-from velatura.tables.build.anisotropic_albedo import albedo
 from velatura.tables.build.multiple_scattering import bin_cosines
 from velatura.tables.build.quadrature import Progress, Reflections, average, ignore
 from velatura.tables.build.single_scattering import mean_transmittance_out, share_in_cone
@@ -53,11 +52,6 @@ def _measures(tables: Tables) -> dict[str, Callable[[], np.ndarray]]:
     def conductor(eta: np.ndarray, kappa: np.ndarray) -> np.ndarray:
         return fgd(tables, conductor_row(tables, eta, kappa), cos_theta, alpha) - _albedo(eta, kappa)
 
-    def drawn() -> np.ndarray:
-        x, y = alpha[:WALKED], 0.02 + 0.98 * eta[:WALKED]
-        truth = albedo(cos_theta[:WALKED, None], x[:, None], y[:, None], 1 << 17)
-        return anisotropic_albedo.drawn_albedo(tables, cos_theta[:WALKED], x, y) - truth
-
     def many(row: Row, eta: np.ndarray, kappa: np.ndarray) -> np.ndarray:
         return fgd(tables, row, cos_theta, alpha)[:WALKED] - _albedo_many(eta, kappa)
 
@@ -82,7 +76,6 @@ def _measures(tables: Tables) -> dict[str, Callable[[], np.ndarray]]:
         "tir_published": lambda: leaving("published", mean_transmittance_out, below),
         "tir_published_outside": lambda: leaving("published", mean_transmittance_out, above),
         "tir_clean": lambda: leaving("clean", share_in_cone, below),
-        "drawn": drawn,
         **_measures_of_parts(tables),
     }
 
