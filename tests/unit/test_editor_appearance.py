@@ -90,7 +90,6 @@ def test_a_material_is_read_and_found_again(model: str) -> None:
     assert deviation(COATED, target, model) < 1e-9
     f = MAPS[named(model).map]
     variances = [float(f.variance(lobe["alpha"])) for lobe in target["lobes"]]
-    assert answer["variances"] == pytest.approx(variances)
     (haze,) = answer["haze"]
     assert haze["width"] == pytest.approx(np.sqrt(variances[1] / variances[0]))
     ratio = np.array(target["lobes"][1]["energy"]) / target["lobes"][0]["energy"]

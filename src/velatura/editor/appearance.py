@@ -111,7 +111,6 @@ def appearance(body: Body) -> Answer:
         target = itself
     return {
         "target": described(target),
-        "variances": _variances(target, model),
         "haze": haze(target, model),
         "layers": _layers(stack, counts),
         "held": _held_back(target, whole.scatters),
@@ -127,10 +126,6 @@ def _varies(stack: Stack) -> str | None:
             own = "so that every point of the surface has lobes of its own; give it one value to drag them"
             return f"layer {address.layer}: has a {value.what}, {own}"
     return None
-
-
-def _variances(target: Target, model: Model) -> list[float]:
-    return [float(MAPS[model.map].variance(lobe.roughness)) for lobe in target.lobes]
 
 
 def _held_back(target: Target, scatters: bool) -> list[Answer]:
@@ -208,7 +203,7 @@ def _layers(stack: Stack, counts: list[int]) -> list[list[int]]:
 
 def _shown(stack: Stack, model: Model, says: str) -> Answer:
     """The lobes of a material that is no target, one for each interface, as far as they are those of one point."""
-    nothing: Answer = {"target": None, "variances": [], "haze": [], "layers": [], "held": [], "says": says}
+    nothing: Answer = {"target": None, "haze": [], "layers": [], "held": [], "says": says}
     try:
         read = stack_lobes(stack, 1.0, model=model)
     except InvalidInput:
@@ -222,7 +217,6 @@ def _shown(stack: Stack, model: Model, says: str) -> Answer:
         target = target.with_roughness(k, Roughness(min(alpha[0, 0], 1.0), min(alpha[1, 0], 1.0), rotation))
     return {
         "target": described(target),
-        "variances": _variances(target, model),
         "haze": haze(target, model),
         "layers": _layers(stack, [1] * len(energies)),
         "held": [{} for _ in energies],
