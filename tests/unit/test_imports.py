@@ -43,7 +43,7 @@ MAY_IMPORT = {
     "inverse": "stack optics tables model ops films kernel",
     "light": "renderer",
     "reference": "light stack optics ops kernel binding renderer films media metals",
-    "checks": "kernel",
+    "checks": "renderer kernel",
     "scenes": "renderer kernel",
     "comparison": "light stack optics model reference renderer checks scenes api kernel bakes",
     "benchmark": "light stack optics model reference checks comparison api kernel bakes programs",

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from velatura import kernel
 from velatura.errors import InvalidInput
+from velatura.renderer.packets import aligned
 
 Array = NDArray[Any]
 
@@ -123,8 +124,8 @@ class Probe:
     def _sample(self, wi: Array, u: Array) -> tuple[Array, ...]:
         import drjit as dr
 
-        mi, (u1, u2, u3) = self.mi, u.astype(np.float32).T
-        si, sample1, sample2 = self.interaction(wi), mi.Float(u1), mi.Point2f(u2, u3)
+        mi, (u1, u2, u3) = self.mi, map(self.floats, u.T)
+        si, sample1, sample2 = self.interaction(wi), u1, mi.Point2f(u2, u3)
         bs, weight = self.bsdf.sample(self.context, si, sample1, sample2, True)
         weight, kind = mi.unpolarized_spectrum(weight), mi.UInt32(bs.sampled_type)
         delta, declared = mi.has_flag(kind, mi.BSDFFlags.Delta), kind & ~mi.UInt32(self.bsdf.flags()) == 0
@@ -162,7 +163,11 @@ class Probe:
         return si
 
     def vector(self, directions: Array) -> Any:
-        return self.mi.Vector3f(np.ascontiguousarray(directions.T, dtype=np.float32))
+        return self.mi.Vector3f(*map(self.floats, directions.T))
+
+    def floats(self, values: Array) -> Any:
+        """Numbers for the renderer, at an address for which every query has the same kernel."""
+        return self.mi.Float(aligned(values))
 
 
 def _in_batches(ask: Callable[[Array, Array], tuple[Array, ...]], a: Array, b: Array) -> tuple[Array, ...]:

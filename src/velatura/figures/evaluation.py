@@ -51,8 +51,9 @@ def timed(bsdfs: Mapping[str, Any], rounds: int, seed: int, lanes: int) -> dict[
         for function in FUNCTIONS:
             for name, probe in probes.items():
                 si, wo = probe.interaction(lights), probe.vector(views)
-                si.uv = mi.Point2f(u[0], u[2])
-                given = (wo,) if function == "eval_pdf" else (mi.Float(u[4]), mi.Point2f(u[3], u[1]))
+                numbers = [probe.floats(each) for each in u]
+                si.uv = mi.Point2f(numbers[0], numbers[2])
+                given = (wo,) if function == "eval_pdf" else (numbers[4], mi.Point2f(numbers[3], numbers[1]))
                 dr.eval(si, given)
                 asked = getattr(probe.bsdf, function)(probe.context, si, *given, True)
                 dr.sync_thread()
