@@ -86,6 +86,16 @@ EVERYTHING_OPEN = """localStorage['velatura.layout'] ??=
   JSON.stringify({ form: 1, value: { look: true, view: true, model: true } })"""
 
 
+# Previews alone are drawn, from the first one on: whatever begins to trace paths compiles their programs
+PREVIEWS_ALONE = """Object.defineProperty(window, 'velatura', {
+  configurable: true,
+  set(app) {
+    Object.defineProperty(window, 'velatura', { value: app });
+    app.viewport.setBudget({ samples: 0 });
+  },
+})"""
+
+
 class Visit:
     """A page of the editor, with what its console has complained about; a slow machine has its time."""
 
@@ -104,7 +114,7 @@ class Visit:
         self._devtools = page.context.new_cdp_session(page)
         self._devtools.send("Page.enable")
         first = self._before(f"sessionStorage.clear();{'localStorage.clear()' if fresh else ''}")
-        self._before(f"{script};{EVERYTHING_OPEN}")
+        self._before(f"{script};{EVERYTHING_OPEN};{PREVIEWS_ALONE}")
         page.goto(address)
         self._devtools.send("Page.removeScriptToEvaluateOnNewDocument", first)
         self.ready()
@@ -125,9 +135,8 @@ class Visit:
             self.complaints.append(message.text)
 
     def ready(self) -> None:
-        """Wait until there is a picture; from then on the preview alone is drawn, which is the same every time."""
+        """Wait until there is a picture: the preview, which is the same every time."""
         self.page.wait_for_function("() => window.velatura?.viewport.slots.a.shader && velatura.viewport.previewed")
-        self.page.evaluate("window.velatura.viewport.setBudget({ samples: 0 })")
 
     def told(self) -> str:
         """The state of the page, for the report of a failed test."""
@@ -170,10 +179,11 @@ class Tabs:
     """Tabs of a browser without a past, for one test after another.
 
     The first tab of each test is the same: it is ready in half of the time, since its process has compiled the page.
+    Two pixels of the page, along both axes, are one of the screen, and of the picture.
     """
 
     def __init__(self, browser: Any, size: tuple[int, int] = (900, 600), **options: Any) -> None:
-        self.context = browser.new_context(**options)
+        self.context = browser.new_context(**{"device_scale_factor": 0.5, **options})
         self.size = size
         self.visits: list[Visit] = []
 
