@@ -105,6 +105,9 @@ class Unrolled:
     def root(self, x: Value, least: float | None) -> Value:
         return sqrt(x if least is None else maximum(x, least))
 
+    def around(self, x: Value, share: float) -> tuple[Value, Value, Value] | None:
+        return None
+
 
 class _Numpy(Unrolled):
     exp, log, power, sin, cos = np.exp, np.log, np.power, np.sin, np.cos
@@ -186,6 +189,12 @@ class _DrJit(Unrolled):
 
     def root(self, x: Value, least: float | None) -> Value:
         return self._dr.sqrt(x if least is None else self.maximum(x, least))
+
+    def around(self, x: Value, share: float) -> tuple[Value, Value, Value] | None:
+        if not self._dr.grad_enabled(x):
+            return None
+        at = self._dr.detach(x)
+        return (1 - share) * at, at, (1 + share) * at
 
     def _is_colour(self, x: Value) -> bool:
         return self._dr.is_array_v(x) and (self._dr.depth_v(x) > 1 or not self._dr.is_jit_v(x))
@@ -310,6 +319,12 @@ class NamedFields:
 def sqrt(x: Value, least: float | None = 0.0) -> Value:
     """Square root of max(x, least); None for an x that is known to be positive."""
     return _dialect(x).sqrt(x) if least == 0.0 else _dialect(x).root(x, least)
+
+
+def around(x: Value, share: float) -> tuple[Value, Value, Value] | None:
+    """Numbers a share of x below it, at it, and above it, without gradients; None for x that is not differentiated."""
+    found: tuple[Value, Value, Value] | None = _dialect(x).around(x, share)
+    return found
 
 
 def exp(x: Value) -> Value:

@@ -10,6 +10,7 @@ import pytest
 import velatura as vt
 from velatura import kernel
 from velatura.model.solved import solve
+from velatura.renderer import low_discrepancy
 
 mi = kernel.mitsuba("llvm_ad_rgb")
 import drjit as dr  # noqa: E402
@@ -28,6 +29,10 @@ MATCHED = {  # with a medium that has the index of the outside
     "bare": vt.Stack([vt.Interface(eta=1.0), MIRROR]),
     "dust": vt.Stack([vt.Medium(depth=0.3, sigma_a=1.0, sigma_s=1.0), vt.Interface(eta=1.0), MIRROR]),
 }
+RARER = vt.Stack(  # the last medium is rarer than the outside
+    [vt.Interface(eta=1.7, alpha=0.5), vt.Interface(eta=1.37), vt.Interface(conductor="mirror", alpha=0.1)],
+    exterior=1.4,
+)
 ROUND = vt.Stack([vt.Interface(conductor="mirror", alpha=0.2)])
 UP, DOWN = (-0.45, -0.15, 0.75), (-0.45, -0.15, -0.75)
 
@@ -98,6 +103,28 @@ def test_a_gradient_by_the_index_of_the_outside_is_the_slope_towards_denser_medi
     dr.backward(value(bsdf, UP))
     same, denser = (float(value(vt.bsdf(stack.replace(**{key: x})), UP)[0]) for x in (1.0, 1.02))
     assert float(dr.grad(eta)[0]) == pytest.approx((denser - same) / 0.02, rel=0.05)
+
+
+def test_the_edge_of_light_out_of_a_rarer_medium_moves_with_its_index() -> None:
+    """The gradient of all light that leaves towards a lamp at the horizon, by that index: to 3 %."""
+    bsdf, eta = vt.bsdf(RARER), mi.Float(1.37)
+    u, turn = (mi.Float(x) for x in low_discrepancy.fibonacci(28657))
+    wo = mi.warp.square_to_cosine_hemisphere(mi.Point2f(u, turn))
+    si = dr.zeros(mi.SurfaceInteraction3f, dr.width(u))
+    si.wi = dr.normalize(mi.Vector3f(0.4, 0.3, 0.8))
+    lamp = dr.select(wo.z < 0.5, 1 / (wo.z * dr.width(u)), 0)
+
+    def light(bsdf: Any) -> Any:
+        return dr.sum(dr.mean(bsdf.eval(mi.BSDFContext(), si, wo)) * lamp)
+
+    parameters = mi.traverse(bsdf)
+    dr.enable_grad(eta)
+    parameters["layer1_eta"] = eta
+    parameters.update()
+    dr.backward(light(bsdf))
+    ends = 0.98 * 1.37, 1.02 * 1.37
+    low, high = (float(light(vt.bsdf(RARER.replace(layer1_eta=end)))[0]) for end in ends)
+    assert float(dr.grad(eta)[0]) == pytest.approx((high - low) / (ends[1] - ends[0]), rel=0.03)
 
 
 def test_one_variable_for_both_axes_leaves_an_interface_isotropic(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -18,7 +18,7 @@ from velatura.stack import Address
 Array = NDArray[np.floating]
 
 MOST = 4  # values of a stack that are tried
-SAMPLES = 4096
+SAMPLES = 1 << 17  # gradients grow as a root about critical angles, so that few say little of their mean
 SMOOTH = 0.01  # roughness of stacks that are not tried
 OFF = 0.1  # of a difference, by which a gradient may be off
 CLOSE, STAYS = 0.01, 0.25  # share of a step, and of the light that changes over the whole one, where light jumps

@@ -29,6 +29,7 @@ from velatura.optics import ggx
 from velatura.optics.ggx import Direction
 from velatura.renderer import compiled, low_discrepancy
 from velatura.renderer.compiled import Found
+from velatura.renderer.differentiated import RELATIVE
 
 Array = NDArray[np.floating]
 
@@ -90,6 +91,18 @@ class RefractedLobe(ops.NamedFields):
 
 def eval_pdf(lobe: RefractedLobe, wi: Direction, wo: Direction) -> tuple[Value, Value]:
     """f(wi, wo) |cos theta_o|, a colour, and the density of `sample`; both 0 unless wi and wo are above the surface."""
+    n = MediumIndex.of(lobe.n)
+    ends = None if n.is_outside or n.denser else ops.around(n.n, RELATIVE)
+    if ends is None:
+        return _eval_pdf(lobe, wi, wo)
+    # Out of a rarer medium light has an edge, which moves with the index: slopes by it are differences
+    (below, _), (value, density), (above, _) = (
+        _eval_pdf(replace(lobe, n=MediumIndex.of(each)), wi, wo) for each in ends
+    )
+    return value + (above - below) * ((n.n - ends[1]) / (ends[2] - ends[0])), density
+
+
+def _eval_pdf(lobe: RefractedLobe, wi: Direction, wo: Direction) -> tuple[Value, Value]:
     alpha_u, alpha_v, n, i = _inside(lobe, wi)
     p = _in_frame(lobe, wo)
     cos_o = ops.select(wi[2] > 0, ops.maximum(wo[2], 0.0), 0.0)
