@@ -23,7 +23,7 @@ from velatura import ops
 from velatura.films.of_material import films_of
 from velatura.films.tables import Coated
 from velatura.model.rough_interface import KEPT, Facets, colours
-from velatura.model.solved.energies.interfaces import Setting, interface
+from velatura.model.solved.energies.interfaces import Setting, interface, lit
 from velatura.model.solved.energies.media import Slab, Straight, medium
 from velatura.model.solved.energies.operators import Functional, Layer, Operator
 from velatura.optics.phase import PhaseFunction
@@ -131,6 +131,12 @@ def settings(found: Sequence[Part], setting: Setting) -> list[Setting]:
 def layer(part: Part, setting: Setting) -> tuple[Layer, Layer]:
     """A layer where facets are met once, and as the setting says, kept for other materials that have one like it."""
 
+    if isinstance(part, Facets) and part.is_exit and not part.final and not len(setting.p):
+        # Stacks that are seen from both sides share what interfaces do
+        once, often = layer(part.reversed(), setting)
+        back = once.reversed()
+        return back, back if often is once else often.reversed()
+
     def key(value: Any) -> Hashable:
         if isinstance(value, Coated | PhaseFunction):
             return value.key
@@ -149,7 +155,7 @@ def layer(part: Part, setting: Setting) -> tuple[Layer, Layer]:
 
 def _made(part: Part, setting: Setting) -> tuple[Layer, Layer]:
     if isinstance(part, Facets):
-        return interface(part, setting)
+        return lit(part, setting, lambda: layer(part, setting.dark)) if len(setting.p) else interface(part, setting)
     alike = medium(part, setting) if isinstance(part, Slab) else _lambert(part, setting)
     return alike, alike
 

@@ -7,10 +7,11 @@ tables of multiple scattering say.
 
 from __future__ import annotations
 
+import functools
 from collections.abc import Callable, Hashable, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
-from typing import TypeVar
+from typing import NamedTuple, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -71,15 +72,58 @@ class Setting:
 
 
 def interface(facets: Facets, setting: Setting) -> tuple[Layer, Layer]:
-    """An interface as a layer, with facets met once, and as the setting says; what is opaque or final lets nothing
-    through, and has no other side."""
-    if not facets.smooth:
-        return _rough(facets, setting)
-    smooth = _smooth(facets, setting)
+    """An interface as a layer without beams, with facets met once, and as the setting says; what is opaque or final
+    lets nothing through, and has no other side."""
     if facets.smooth == 1:
+        smooth = _smooth(facets, setting)
         return smooth, smooth
-    once, often = (each.mixed(smooth, facets.smooth) for each in _rough(facets, setting))
-    return once, often
+    nothing, both = Operator.nothing(setting.basis.size, 0), _sides(facets)
+    met = [_Met.of_each(side, _sources(side, setting), setting)[0] for side in both]
+    blocked = _blocked(both, setting)
+    sides = [_outcomes(side, at, blocked[::turned], setting) for side, at, turned in zip(both, met, (1, -1))]
+
+    def layer(way: int) -> Layer:
+        made = [Operator.of(matrix, nothing.columns) for side in sides for matrix in side[way]]
+        found = Layer(*made, *[nothing] * (4 - len(made)))
+        return found.mixed(_smooth(facets, setting), facets.smooth) if facets.smooth else found
+
+    once = layer(0)
+    return once, layer(1) if setting.often else once
+
+
+def lit(facets: Facets, setting: Setting, dark: Callable[[], tuple[Layer, Layer]]) -> tuple[Layer, Layer]:
+    """The same with the beams of the setting, given what it is without."""
+    smooth = _smooth(facets, setting) if facets.smooth else None
+    if smooth and facets.smooth == 1:
+        return smooth, smooth
+    # Light is not in beams any more below what is rough as a whole
+    both = _sides(facets)
+    reached = both[: 2 if smooth else 1]
+    met = [_Met.of_each(side, _sources(side, setting), setting)[1] for side in reached]
+    blocked = _blocked(both, setting)
+    sides = [_outcomes(side, at, blocked[::turned], setting, True) for side, at, turned in zip(reached, met, (1, -1))]
+
+    def layer(way: int, made: Layer) -> Layer:
+        found = [*vars(made).values()]
+        if len(both) == 1:
+            found[1:] = [Operator.nothing(setting.basis.size, len(setting.p))] * 3
+        for k, columns in enumerate(columns for side in sides for columns in side[way]):
+            found[k] = Operator.of(found[k].nodes, columns)
+            if smooth:
+                straight = [*vars(smooth).values()][k].beams
+                found[k] = replace(found[k], columns=(1 - facets.smooth) * columns, beams=facets.smooth * straight)
+        return Layer(*found)
+
+    once, often = dark()
+    first = layer(0, once)
+    return first, first if often is once else layer(1, often)
+
+
+def _sides(facets: Facets) -> list[Facets]:
+    """Facets as light from above meets them, and unless nothing passes, from below, no longer than modes resolve."""
+    least = max(ALPHA_MIN, max(facets.alpha_u, facets.alpha_v) / RESOLVED)
+    resolved = replace(facets, alpha_u=max(facets.alpha_u, least), alpha_v=max(facets.alpha_v, least))
+    return [resolved] if facets.opaque or facets.final else [resolved, resolved.reversed()]
 
 
 def _smooth(facets: Facets, setting: Setting) -> Layer:
@@ -91,51 +135,10 @@ def _smooth(facets: Facets, setting: Setting) -> Layer:
     return Layer(r, t, *(scaled(partial(back.share, transmitted=side), setting) for side in (False, True)))
 
 
-def _rough(facets: Facets, setting: Setting) -> tuple[Layer, Layer]:
-    # Light is not in beams any more below what is rough as a whole
-    behind = setting if facets.smooth else setting.dark
-    least = max(ALPHA_MIN, max(facets.alpha_u, facets.alpha_v) / RESOLVED)
-    facets = replace(facets, alpha_u=max(facets.alpha_u, least), alpha_v=max(facets.alpha_v, least))
-    nothing = Operator.nothing(setting.basis.size, len(setting.p))
-    above = _Side.of(facets, setting)
-    if facets.opaque or facets.final:
-        once, first = (Layer(r, nothing, nothing, nothing) for r in above.r)
-        if not above.blocked:
-            return once, once
-        to_r = above.blocked[0]
-        return once, replace(first, r=first.r + _again(to_r, to_r, above.second[:1], facets, setting))
-    below = _Side.of(facets.reversed(), behind)
-    once, first = (Layer(*each) for each in zip(above.r, above.t, below.r, below.t))
-    if not (above.blocked and below.blocked):
-        return once, once
-    (to_r, to_t), (back_to_r, back_to_t) = above.blocked, below.blocked
-    return once, Layer(
-        first.r + _again(to_r, to_r, above.second[:1], facets, setting),
-        first.t + _again(to_t, back_to_t, above.second[1:], facets, setting),
-        first.r_below + _again(back_to_r, back_to_r, below.second[:1], facets, setting),
-        first.t_below + _again(back_to_t, to_t, below.second[1:], facets, setting),
-    )
-
-
 def scaled(share: Callable[[Array], Array], setting: Setting) -> Operator:
     """An operator that changes no direction, but scales light by shares (C, ...) for lengths of momentum."""
     nodes = setting.basis.diagonal(share(setting.basis.nodes.p))
     return Operator(nodes, np.zeros((1, 1, nodes.rows, len(setting.p))), share(setting.p)[:, None, None])
-
-
-@dataclass(frozen=True)
-class _Blocked:
-    """Shares of light that meets further facets, and in the end is reflected, or passes.
-
-    Those of light from the nodes as functionals (C, modes, N), those of beams (C, M); `emitted` is light of one unit
-    that leaves in such directions, by reciprocity those in which light is blocked. `sines` are those of the nodes, and
-    of beams.
-    """
-
-    nodes: Array
-    beams: Array
-    emitted: Array
-    sines: tuple[Array, Array]
 
 
 @dataclass(frozen=True)
@@ -149,24 +152,27 @@ class _Met:
     second: tuple[Array, ...] = ()
 
     @classmethod
-    def of(cls, facets: Facets, p: Array, psi: Array, setting: Setting) -> _Met:
-        """Once for interfaces that are alike but for their rotation and the unit of momentum."""
-        nodes = setting.basis.nodes
-        if facets.alpha_u == facets.alpha_v and (lengths := np.unique(p)).shape < p.shape:
-            return cls.of(facets, lengths, 0 * lengths, setting)._of_some(np.searchsorted(lengths, p))
-        unit = nodes.ends[-1]
-        momenta = (np.round(np.asarray(x) / unit, DIGITS).tobytes() for x in (p, nodes.ends))
-        key = facets.key(unit), *momenta, psi.tobytes()
-        return setting.kept(key, lambda: cls._of(facets, p, psi, setting))
-
-    @classmethod
     def of_each(cls, facets: Facets, sources: Sequence[tuple[Array, Array]], setting: Setting) -> list[_Met]:
-        """First events of groups of sources (p, psi), at once where none depends on the axes of the facets."""
+        """First events of groups of sources (p, psi), once for interfaces that are alike but for their rotation and the
+        unit of momentum; all that are not known at once where none depends on the axes of the facets."""
+        facets, nodes = replace(facets, rotation=0.0), setting.basis.nodes
+        unit = nodes.ends[-1]
+        own = facets.key(unit), np.round(np.array(nodes.ends) / unit, DIGITS).tobytes()
+
+        def kept(p: Array, psi: Array, make: Callable[[], _Met]) -> _Met:
+            return setting.kept((*own, np.round(p / unit, DIGITS).tobytes(), psi.tobytes()), make)
+
         if facets.alpha_u != facets.alpha_v:
-            return [cls.of(facets, *each, setting) for each in sources]
-        p, psi = map(np.concatenate, zip(*sources))
-        met, ends = cls.of(facets, p, psi, setting), np.cumsum([len(each) for each, _ in sources])
-        return [met._of_some(slice(end - len(each), end)) for end, (each, _) in zip(ends, sources)]
+            return [kept(p, psi, partial(cls._of, facets, p, psi, setting)) for p, psi in sources]
+        each = [np.unique(p, return_inverse=True) for p, _ in sources]
+        every = np.concatenate([lengths for lengths, _ in each])
+        together = functools.cache(lambda: cls._of(facets, every, 0 * every, setting))
+        found, end = [], 0
+        for (p, _), (lengths, places) in zip(sources, each):
+            these, end = slice(end, end + len(lengths)), end + len(lengths)
+            some = kept(lengths, 0 * lengths, partial(lambda these: together()._of_some(these), these))
+            found.append(some if np.array_equal(lengths, p) else some._of_some(places))
+        return found
 
     @classmethod
     def _of(cls, facets: Facets, p: Array, psi: Array, setting: Setting) -> _Met:
@@ -191,78 +197,98 @@ class _Met:
         return _Met(self.reflected[..., sources], refracted, shares, tuple(x[..., sources] for x in self.second))
 
 
-@dataclass(frozen=True)
-class _Side:
-    """Light from one side of an interface after first events, with facets met once, and as the setting says; what the
-    latter block, that in the end is reflected, and that passes; and of brushed interfaces both with the directions of
-    `second` events.
-    """
+class _Blocked(NamedTuple):
+    """Shares (C, sources) of light from the nodes that first events block and that in the end is reflected, or passes;
+    light (C, modes, N) of one unit that leaves in such directions, by reciprocity those in which light is blocked; and
+    sines of the nodes."""
 
-    r: tuple[Operator, Operator]
-    t: tuple[Operator, Operator]
-    blocked: tuple[_Blocked, _Blocked] | None
-    second: tuple[Operator, ...] = ()
+    shares: tuple[Array, Array]
+    emitted: Sequence[Array]
+    sines: Array
 
     @classmethod
-    def of(cls, facets: Facets, setting: Setting) -> _Side:
-        basis = setting.basis
-        turn = 0.0 if facets.alpha_u == facets.alpha_v else facets.rotation
-        along_axes = replace(facets, rotation=0.0)
-        p, psi = np.tile(basis.nodes.p, len(basis.azimuths)), np.repeat(basis.azimuths, basis.nodes.count)
-        sources = (p, psi), (setting.p, basis.relative(setting.phi, turn))
-        at_nodes, of_beams = _Met.of_each(along_axes, sources, setting)
-
-        def operators(nodes: Array | None, beams: Array | None) -> tuple[Operator, Operator]:
-            if nodes is None or beams is None:
-                nothing = Operator.nothing(basis.size, len(setting.p))
-                return nothing, nothing
-            both = basis.operators(nodes, turn), basis.columns(beams, turn)
-            found = [Operator.of(*each) for each in zip(*(np.split(x, len(setting.ways)) for x in both))]
-            return found[0], found[-1]
-
-        r, t = operators(at_nodes.reflected, of_beams.reflected), operators(at_nodes.refracted, of_beams.refracted)
-        if setting.often is None:
-            return cls(r, t, None)
+    def of(cls, facets: Facets, setting: Setting) -> _Blocked:
+        basis, (source, *_) = setting.basis, _sources(facets, setting)
+        met = _Met.of_each(facets, [source], setting)[0]
+        shares = _again_shares(facets, setting, source[0], met.shares)
         # Of nodes about the index of a medium some may have less than none
-        n = float(ops.mean(facets.above))
-        weights = np.maximum(basis.nodes.weights(n), 0)
-        blocked = []
-        sines = np.minimum(basis.nodes.p / n, 1), np.minimum(setting.p / n, 1)
-        shares = [_again_shares(facets, setting, q, met.shares) for q, met in ((p, at_nodes), (setting.p, of_beams))]
-        for nodes, beams in zip(*shares):
-            rows = basis.rows(nodes, turn)
-            emitted = rows * weights
-            emitted = emitted / np.maximum(emitted[:, :1].sum(-1, keepdims=True), TINY)
-            blocked.append(_Blocked(rows, beams, emitted, sines))
-        second = []
-        for lights, of in zip(zip(at_nodes.second, of_beams.second), zip(*shares)):
-            # A trace leaves evenly, for sources of which second events reflect, or let pass, nothing
-            even = TRACE * basis.rows(np.ones_like(of[0]), 0.0)[..., None] * weights[:, None] / weights.sum()
-            nodes, beams = (
-                (light + even) * (share / (light + even)[:, 0].sum(axis=1))[:, None, None]
-                for light, share in zip(lights, of)
-            )
-            second.append(Operator.of(basis.operators(nodes, turn), basis.columns(beams, turn)))
-        return cls(r, t, (blocked[0], blocked[1]), tuple(second))
+        weights = np.maximum(basis.nodes.weights(float(ops.mean(facets.above))), 0)
+        emitted = [basis.rows(share, _turn(facets)) * weights for share in shares]
+        emitted = [each / np.maximum(each[:, :1].sum(-1, keepdims=True), TINY) for each in emitted]
+        return cls(shares, emitted, _sines(facets, basis.nodes.p))
 
 
-def _again(taken: _Blocked, there: _Blocked, second: Sequence[Operator], facets: Facets, setting: Setting) -> Operator:
-    """Light that is blocked at first, and leaves in the directions in which light is blocked `there`: the less facets
-    turn it, the more of it goes on as it came. Brushed ones, which keep its momentum along them, send what they reflect
-    where their `second` events do, and a share of what passes; rough ones a share of what passes."""
-    exact = facets.across if there is taken else max(fitted.PASSED_ON * facets.across, facets.onward)
-    if exact == 1:
-        return second[0]
+def _blocked(sides: Sequence[Facets], setting: Setting) -> list[_Blocked]:
+    """What each side blocks, where facets are met often; kept for the same facets with other beams."""
+    if setting.often is None:
+        return []
+    key = setting.dark.key
+    return [KEPT.once((_Blocked, side.key(), key), partial(_Blocked.of, side, setting)) for side in sides]
+
+
+def _sources(facets: Facets, setting: Setting) -> list[tuple[Array, Array]]:
+    """Lengths of momentum and azimuths from the axes of facets: of light from the nodes, and of beams if there are
+    any."""
+    basis = setting.basis
+    at_nodes = np.tile(basis.nodes.p, len(basis.azimuths)), np.repeat(basis.azimuths, basis.nodes.count)
+    return [at_nodes, (setting.p, basis.relative(setting.phi, _turn(facets)))][: 2 if len(setting.p) else 1]
+
+
+def _turn(facets: Facets) -> float:
+    return 0.0 if facets.alpha_u == facets.alpha_v else facets.rotation
+
+
+def _outcomes(
+    facets: Facets, met: _Met, blocked: Sequence[_Blocked], setting: Setting, beams: bool = False
+) -> tuple[list[Array], list[Array]]:
+    """Light that facets reflect and, unless nothing passes, let pass, with facets met once, and as the setting says:
+    matrices of light from the nodes, or columns of beams; `blocked` is that of both sides."""
+    basis, turn = setting.basis, _turn(facets)
+    project = partial(basis.columns if beams else basis.operators, rotation=turn)
+    lights = [light for light in (met.reflected, met.refracted) if light is not None]
+    ways = [np.split(project(light), len(setting.ways)) for light in lights]
+    once, first = [each[0] for each in ways], [each[-1] for each in ways]
+    if not blocked:
+        return once, once
+    own, phi = blocked[0], setting.phi if beams else None
+    shares = _again_shares(facets, setting, setting.p, met.shares) if beams else own.shares
+    sines = _sines(facets, setting.p) if beams else own.sines
+    often = []
+    for k, (light, share) in enumerate(zip(first, shares)):
+        # The less facets turn light that is blocked, the more of it goes on as it came. Brushed ones, which keep its
+        # momentum along them, send what they reflect where second events do, and a share of what passes; rough ones a
+        # share of what passes
+        exact = max(fitted.PASSED_ON * facets.across, facets.onward) if k else facets.across
+        if exact:
+            light = light + exact * project(_second(facets, setting, met.second[k], share))
+        if exact < 1:
+            # It leaves in the directions in which light is blocked there
+            there = blocked[1] if k else own
+            even = basis.outer(there.emitted[k], share if beams else basis.rows(share, turn))
+            even = basis.swung(even, _swing(facets), there.sines, sines, phi)
+            light = light + (1 - exact) * even
+        often.append(light)
+    return once, often
+
+
+def _sines(facets: Facets, p: Array) -> Array:
+    return np.asarray(np.minimum(p / float(ops.mean(facets.above)), 1))
+
+
+def _swing(facets: Facets) -> float:
+    """How much of the light that is blocked at first goes on as it came."""
     turn = 0.5 * (facets.alpha_u + facets.alpha_v) * (fitted.OPAQUE_STEP if facets.opaque else facets.step)
-    swing = fitted.SWING * float(np.exp(-fitted.SWING * turn))  # model.md, Eq. 4
-    nodes, beams = (
-        setting.basis.swung(setting.basis.outer(there.emitted, light), swing, there.sines[0], sines, phi)
-        for light, sines, phi in zip(
-            (taken.nodes, taken.beams), taken.sines, (None, setting.phi[: len(taken.sines[1])])
-        )
-    )
-    even = Operator.of(nodes, beams)
-    return exact * second[0] + (1 - exact) * even if exact else even
+    return fitted.SWING * float(np.exp(-fitted.SWING * turn))  # model.md, Eq. 4
+
+
+def _second(facets: Facets, setting: Setting, light: Array, share: Array) -> Array:
+    """Light of second events, of which sources have a share (C, sources)."""
+    basis = setting.basis
+    weights = np.maximum(basis.nodes.weights(float(ops.mean(facets.above))), 0)
+    # A trace leaves evenly, for sources of which second events reflect, or let pass, nothing
+    sources = np.ones((len(share), len(basis.azimuths) * basis.nodes.count))
+    light = light + TRACE * basis.rows(sources, 0.0)[..., None] * weights[:, None] / weights.sum()
+    return np.asarray(light * (share / light[:, 0].sum(axis=1))[:, None, None])
 
 
 def _again_shares(facets: Facets, setting: Setting, p: Array, events: FirstShares) -> tuple[Array, Array]:

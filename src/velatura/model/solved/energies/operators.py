@@ -132,6 +132,10 @@ class Layer:
         alike = self.r_below is self.r and self.t_below is self.t
         return Layer(r, t, r, t) if alike else Layer(r, t, change(self.r_below), change(self.t_below))
 
+    def reversed(self) -> Layer:
+        """The same turned over."""
+        return Layer(self.r_below, self.t_below, self.r, self.t)
+
     def mixed(self, other: Layer, share: float) -> Layer:
         """A layer that does what another one does to a share of light."""
         both = zip(vars(self).values(), vars(other).values())
