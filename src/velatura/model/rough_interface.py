@@ -36,7 +36,7 @@ DIGITS = 9  # of indices that are alike
 BRUSHED = 0.05  # difference of two roughnesses, as share of the larger, from which normals do not turn with the light
 WALKED = 16  # directions of walks between facets with films
 PATHS = 2048  # from each
-KEPT = Kept(64 << 20)  # layers, and what they are made of
+KEPT = Kept(128 << 20)  # layers, and what they are made of
 
 
 def colours(value: Any) -> Array:
