@@ -24,6 +24,7 @@ COATED = vt.Stack(
     ]
 )
 PANE = vt.Stack([vt.Interface(eta=1.5, alpha=0.1), vt.Interface(eta=1.3, alpha=0.2)])
+FROSTED = vt.Stack([vt.Interface(eta=1.5, alpha=0.3), vt.Medium(sigma_a=0.3), vt.Interface(eta=1.0, alpha=0.2)])
 DUST = vt.Stack([vt.Medium(depth=0.5, sigma_s=(0.9, 0.7, 0.5), sigma_a=0.1, g=0.7), COATED.layers[-1]])
 FOG = vt.Stack([DUST.layers[0], vt.Interface(eta=1.0)])
 PAINT = vt.Stack([vt.Interface(eta=1.5, alpha=0.1), vt.Diffuse(albedo=0.5)])
@@ -76,6 +77,7 @@ def light(bsdf: Any, cosine: float) -> np.ndarray:
         (COATED, {"layer0_alpha": (0.02, 0.5), "layer2_alpha": (0.05, 0.6)}),
         (COATED, {"layer1_depth": (0.1, 2.0), "layer0_eta": (1.2, 1.7)}),
         (PANE, {"layer1_alpha": (0.05, 0.6)}),
+        (FROSTED, {"layer0_alpha": (0.25, 0.6)}),
         (PAINT, {"layer1_albedo": ((0.1, 0.5, 0.7), (0.6, 0.2, 0.8))}),
         (DUST, {"layer0_g": (0.4, 0.4), "layer1_alpha": (0.2, 0.2)}),
         (DUST, {"layer0_sigma_s": ((0.0, 0.4, 0.6), (0.8, 0.6, 0.9)), "layer0_depth": (0.1, 2.0)}),

@@ -96,9 +96,17 @@ class Side:
         return Declaration(len(self.shapes), len(fields(self.kind)), passes, top, self.wide)
 
     def at(self, w: Direction) -> Columns:
-        """The columns for a direction above."""
+        """The columns for a direction above, where each part has its share."""
+        return self.narrowed(self.read(w))
+
+    def read(self, w: Direction) -> Columns:
+        """The columns for a direction above, as they are declared."""
         found = self.declaration.read(self._values(self.declaration.columns, self.curves(w)))
         return replace(found, chance=ops.maximum(found.chance, 0.0))
+
+    def narrowed(self, columns: Columns) -> Columns:
+        """Columns where what is wide is no more that of lobes."""
+        return columns.narrowed([shape.interface > 0 for shape in self.shapes]) if self.wide else columns
 
     def _values(self, columns: Iterable[Column], channels: Iterable[Value]) -> list[Value]:
         """Numbers and colours of columns, by their rows."""
@@ -118,16 +126,19 @@ class Side:
         """The view from a direction above with the reflected part of number k alone, which is the first one. In
         NumPy."""
         weight, *others = self._only(w, self.declaration.part(k))
-        roughness, beyond = (others, []) if k < len(self.shapes) else ([], others)
+        count = self.declaration.entries if k < len(self.shapes) else 0
+        roughness, beyond = others[:count], others[count:]
         of_top, beyond = (beyond[0], beyond[1:]) if self.top and beyond else (None, beyond)
-        columns = Columns([weight], [tuple(roughness)], [], [], weight, 0.0, 0.0, None, None, of_top, beyond)
-        return replace(self, shapes=self.shapes[k : k + 1]).given(w, columns)
+        narrow, beyond = (beyond[0], beyond[1:]) if self.wide else (1.0, beyond)
+        columns = Columns([weight], [tuple(roughness)], [], [], weight, 0.0, 0.0, None, None, of_top, narrow, beyond)
+        part = replace(self, shapes=self.shapes[k : k + 1])
+        return part.given(w, part.narrowed(columns))
 
     def through(self, w: Direction) -> SideView:
         """The view from a direction above with what passes alone. In NumPy."""
         found, count = self._only(w, self.declaration.through), len(self.declaration.parts)
         columns = Columns([], [], [], [], 0.0, 0.0, 0.0, Parts(*found[:count]), None, wide_passed=found[count:])
-        return replace(self, shapes=(), top=None).given(w, columns)
+        return replace(self, shapes=(), top=None).given(w, self.narrowed(columns))
 
     def _only(self, w: Direction, chosen: Sequence[int]) -> list[Value]:
         """Values of columns of some numbers; others are not read."""
@@ -222,7 +233,7 @@ class SideView:
         through, or its weight."""
         passes = self.columns.passes
         assert self.transmission and passes
-        passes = replace(passes, straight=passes.narrow) if whole else passes
+        passes = replace(passes, straight=passes.narrow * (1.0 if whole else passes.straight))
         found, density = combined.eval_pdf(self.transmission, passes, i, o)
         if self.columns.wide_passed:
             energy, *numbers = self.columns.wide_passed

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
-from dataclasses import dataclass, field, fields
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, field, fields, replace
 from itertools import accumulate
 
 from velatura.model.solved.lobes import wide
@@ -51,6 +51,7 @@ class Declaration:
             found += [Column(f"passed_{name}", colour=name in Parts.COLOURS) for name in self.parts]
             found.append(Column("passed", colour=True, energy=True))
         found += [Column("of_top")] if self.top else []
+        found += [Column("narrow")] if self.wide else []
         for name in WIDE_SIDES if self.wide else ():
             found += [Column(f"{name}_energy", colour=True), *[Column(name)] * wide.COUNT]
         return found
@@ -75,11 +76,11 @@ class Declaration:
 
     def part(self, k: int) -> list[int]:
         """Numbers of the columns that make the reflected part of number k: weight and roughness, or of the last one,
-        the remainder, scale, the share of a medium on top, if there is one, and what is wide."""
-        each = self.entries + 1
+        the remainder, scale and the share of a medium on top, if there is one; and after these what is wide."""
+        each, wide_light = self.entries + 1, self._named("narrow")
         if k < self.lobes:
-            return [each * self.lobes + k, *range(k * each, k * each + self.entries)]
-        return [each * self.lobes + k, *self._named("of_top"), *self._named("wide_reflected")]
+            return [each * self.lobes + k, *range(k * each, k * each + self.entries), *wide_light]
+        return [each * self.lobes + k, *self._named("of_top"), *wide_light, *self._named("wide_reflected")]
 
     @property
     def through(self) -> list[int]:
@@ -123,9 +124,9 @@ class Declaration:
         (scale,), (rest,) = by_name["scale"], by_name["rest"]
         of_top = by_name["of_top"][0] if self.top else None
         reflecting, passing = ([*by_name.get(f"{name}_energy", []), *by_name.get(name, [])] for name in WIDE_SIDES)
-        return Columns(
-            weights, roughness, chances, energies, scale, chance, rest, passes, passed, of_top, reflecting, passing
-        )
+        narrow = by_name.get("narrow", [1.0])[0]
+        reflected = weights, roughness, chances, energies, scale, chance, rest
+        return Columns(*reflected, passes, passed, of_top, narrow, reflecting, passing)
 
 
 @dataclass(frozen=True)
@@ -133,8 +134,12 @@ class Columns:
     """One direction's values, or arrays (C, M) and (M,) over directions.
 
     `weights`, `roughness`, `chances` and `energies` are those of lobes; of the remainder `scale`, `chance` and `rest`.
-    `of_top` is the share of its samples that a medium on top has, None without one. `wide_reflected`, which is of the
-    remainder, and `wide_passed` are an energy, a colour, and numbers of `velatura.model.solved.lobes.wide`, or nothing.
+    `of_top` is the share of its samples that a medium on top has, None without one.
+
+    Of light that may be too wide for lobes these are the columns of lobes alone. Of what is reflected other lobes than
+    those of the first interface, and the remainder, keep a share `narrow`, and of what passes `passes.narrow`; all else
+    is `wide_reflected`, which is of the remainder, and `wide_passed`: an energy, a colour, and numbers of
+    `velatura.model.solved.lobes.wide`, or nothing. So each of them varies evenly between materials.
     """
 
     weights: list[Value]
@@ -147,8 +152,28 @@ class Columns:
     passes: Parts | None
     passed: Value | None
     of_top: Value | None = None
+    narrow: Value = 1.0
     wide_reflected: list[Value] = field(default_factory=list)
     wide_passed: list[Value] = field(default_factory=list)
+
+    def narrowed(self, inner: Sequence[bool]) -> Columns:
+        """The columns where each part has its share; `inner` says of each lobe whether it is of another interface than
+        the first."""
+        weights, energies = (
+            [self.narrow * x if each else x for each, x in zip(inner, values)]
+            for values in (self.weights, self.energies)
+        )
+        handed = sum(energy for each, energy in zip(inner, self.energies) if each)
+        return replace(
+            self,
+            weights=weights,
+            energies=energies,
+            scale=self.narrow * self.scale,
+            rest=self.rest + (1 - self.narrow) * handed,
+            passes=self.passes and self.passes.narrowed(),
+            wide_reflected=_scaled(1 - self.narrow, self.wide_reflected),
+            wide_passed=_scaled(1 - self.passes.narrow, self.wide_passed) if self.passes else [],
+        )
 
     @property
     def declaration(self) -> Declaration:
@@ -164,4 +189,10 @@ class Columns:
         if self.passes:
             found += [*(getattr(self.passes, name) for name in self.declaration.parts), self.passed]
         found += [] if self.of_top is None else [self.of_top]
+        found += [self.narrow] if self.wide_passed else []
         return [*found, *self.wide_reflected, *self.wide_passed]
+
+
+def _scaled(factor: Value, light: Sequence[Value]) -> list[Value]:
+    """An energy times a factor, and its numbers."""
+    return [*(factor * energy for energy in light[:1]), *light[1:]]

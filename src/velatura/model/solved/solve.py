@@ -161,7 +161,7 @@ class Lit:
 
         columns = Columns(*map(taken, vars(self.columns).values()))
         x, y, z = map(taken, self.wi)
-        return self.side.given((x, y, z), columns), (x, y, z)
+        return self.side.given((x, y, z), self.side.narrowed(columns)), (x, y, z)
 
 
 class _Lobe(NamedTuple):
@@ -224,7 +224,7 @@ class Solver:
     `shape` is that of the grid on which a renderer has the columns. `samples` are those of `reciprocal_balance`;
     `normals` are those of facets, and of lobes that are integrated, None for as many as usual, or as are asked for by
     `finely`. A medium on top scatters by `phase_of` its values. Light that is too `wide` for lobes has a shape of its
-    own, where materials have values of their own, none of a table.
+    own.
     """
 
     model: Model
@@ -331,10 +331,10 @@ class Solver:
         samples, colour, kind = polynomial.samples, context.colour, self.kind
         return Side(curves, shapes, polynomial, samples, transmission, colour, self.colours, kind, top, self.wide)
 
-    def own(self, material: Material, layouts: Sequence[Layout]) -> Solver:
-        """The solver for a material of NumPy's values of its own."""
+    def own(self, materials: Sequence[Material], layouts: Sequence[Layout]) -> Solver:
+        """The solver for all of some materials of NumPy's values, with wide light if one of them may have any."""
         apart = any(layout.apart for layout in layouts)
-        return replace(self, wide=not apart and wide.share(material) > 0)
+        return replace(self, wide=not apart and any(wide.share(material) > 0 for material in materials))
 
     def medium(self, kind: type[Medium], material: Material, layout: Layout, shares: Sequence[Value]) -> Medium:
         """The medium on top of a material in any dialect, with shares of its wider phase functions."""
@@ -360,7 +360,7 @@ class Solver:
     def lit(self, material: Material, wi: Direction) -> Lit:
         """The upper side of a material of NumPy's values, solved for light from directions wi, (M,) each, alone."""
         (layout, *_), upper = self.layouts([material]), sides(material)[0]
-        solver = self.own(material, [layout])
+        solver = self.own([material], [layout])
         found = solver._side(upper, layout, Listed(self.isotropic, wi))
         return Lit(solver._in_numpy(upper, found.numbers, layout, None), found.columns, wi)
 
@@ -539,10 +539,7 @@ class Solver:
             whole = np.repeat(whole, math.prod(self.shape[1:]), axis=-1)
             firsts = (declared.first_rows(name, self.colours)[0] for name in ("scale", "rest"))
             scale, rest = (slice(k, k + self.colours) for k in firsts)
-            light = rows[rest]
-            for row in declared.first_rows("wide_reflected_energy", self.colours):
-                light = light - rows[row : row + self.colours]
-            rows[scale] = _scale(light, whole)
+            rows[scale] = _scale(rows[rest], whole)
         return rows
 
     def _pass_between(self, rows: Array, transmission: Transmission, energy: int, weights: Sequence[int]) -> None:
@@ -556,8 +553,8 @@ class Solver:
         if not len(there):
             return
         x, y, z = (w[there] for w in wi)
-        light, straight, bounces, _, *others = (rows[k : k + self.colours, there] for k in (energy, *weights))
-        left = light - combined.energy(transmission, (x, y, z), straight, bounces) - sum(others)
+        light, straight, bounces = (rows[k : k + self.colours, there] for k in (energy, *weights[:2]))
+        left = light - combined.energy(transmission, (x, y, z), straight, bounces)
         rest = slice(weights[2], weights[2] + self.colours)
         rows[rest, there] = combined.rest(transmission, (x, y, z), left)
 
@@ -619,7 +616,7 @@ def solve(material: Material, model: Model, variance: type[Variance], context: C
     start, given = plain(material), Variables.of(material)
     solver = Solver.of(model, variance, context, start)
     layouts = solver.layouts([start, *given.ends(start)])
-    solver = solver.own(start, layouts)
+    solver = solver.own([start], layouts)
 
     packings: list[Packing] = []
 

@@ -109,7 +109,7 @@ def solve(material: Material, places: Array, model: Model, variance: type[Varian
     given, start = Variables.of(material), plain(material)
     solver = Solver.over(len(places), model, variance, context, start)
     layouts = solver.layouts([start, *given.ends(start)])
-    solver = solver.own(start, layouts)
+    solver = solver.own([start], layouts)
     declared: list[Declaration] = []
 
     def arrays(numbers: list[float]) -> list[Array]:

@@ -24,7 +24,7 @@ from velatura import ops
 from velatura.films import textured as textured_films
 from velatura.model.base import Body, Model
 from velatura.model.context import Context, at_a_point
-from velatura.model.solved import solve, texture_axes
+from velatura.model.solved import solve, texture_axes, wide_light
 from velatura.model.solved.bsdf import Side, Solved
 from velatura.model.solved.columns import Columns
 from velatura.model.solved.guards import ENERGY_EPS
@@ -147,8 +147,8 @@ class _Interpolated(Side):
 
     summed: bool = False
 
-    def at(self, w: Direction) -> Columns:
-        return _bounded(super().at(w), self.summed)
+    def read(self, w: Direction) -> Columns:
+        return _bounded(super().read(w), self.summed)
 
 
 def _bounded(found: Columns, summed: bool) -> Columns:
@@ -158,15 +158,18 @@ def _bounded(found: Columns, summed: bool) -> Columns:
     passes: list[Value] = []
     of = found.passes
     if of:
-        passes = [ops.maximum(x, 0.0) for x in (of.of_straight, of.of_bounced, of.of_rest)]
+        passes = [ops.maximum(getattr(of, name), 0.0) for name in Parts.CHANCES]
     if summed:
         energies = [0.5 * ops.maximum(ops.mean(x), 0.0) for x in (*found.energies, found.rest)]
         *chances, chance = (ops.maximum(a, b) for a, b in zip((*chances, chance), energies))
         passes = [ops.maximum(x, OF_PASSED * ops.maximum(ops.mean(found.passed), 0.0)) for x in passes]
     total = sum(chances) + chance + sum(passes)
     if of:
-        weights = (ops.maximum(x, 0.0) for x in (of.straight, of.bounced, of.rest))
-        of = Parts(*weights, *(x / total for x in passes), *of.numbers)
+        weights = {name: ops.maximum(getattr(of, name), 0.0) for name in Parts.COLOURS}
+        of = replace(of, **weights, **dict(zip(Parts.CHANCES, (x / total for x in passes))))
+        if found.wide_passed:
+            crowded = ops.clip(of.forward, 0.0, wide_light.CROWDED_MOST)
+            of = replace(of, forward=crowded, narrow=ops.clip(of.narrow, 0.0, 1.0))
     return replace(
         found,
         weights=[ops.maximum(x, 0.0) for x in found.weights],
@@ -175,6 +178,7 @@ def _bounded(found: Columns, summed: bool) -> Columns:
         chance=chance / total,
         passes=of,
         of_top=None if found.of_top is None else ops.clip(found.of_top, 0.0, top_medium.MOST),
+        narrow=ops.clip(found.narrow, 0.0, 1.0),
     )
 
 
@@ -248,8 +252,9 @@ def _tabulated(
         return before
     groups = _groups(spanned, together if isotropic else 1)
     ends = product(*((axis.values[0], axis.values[-1]) for axis in spanned))
-    corners = [texture_axes.placed(start, spanned, values) for values in ends]
-    layouts = solver.layouts([start, *corners, *given.ends(start)])
+    extremes = [start, *(texture_axes.placed(start, spanned, values) for values in ends)]
+    layouts = solver.layouts([*extremes, *given.ends(start)])
+    solver = solver.own(extremes, layouts)
 
     reads: list[list[int]] = []
 

@@ -31,7 +31,8 @@ View = Callable[[NDArray[np.integer]], tuple[SideView, Direction]]
 
 EVENLY = 144  # directions of each side at which samples are looked at
 STEEP = 0.1  # sine of light below which samples crowd less
-FORWARD = np.linspace(0, 0.8, 17)  # shares of the momentum of light, about which samples crowd
+CROWDED_MOST = 0.8  # share of the momentum of light, about which samples crowd
+FORWARD = np.linspace(0, CROWDED_MOST, 17)
 
 
 def cosines(folded: Folded | Listed) -> Array:
@@ -48,7 +49,7 @@ def columns(
     folded: Folded | Listed,
 ) -> tuple[Columns, Array]:
     """Columns of a side of which waves have a share of the light at most, and what they have (M,), of what is reflected
-    or of what passes, whichever is more.
+    or of what passes, whichever is more. Numbers are known where waves have nothing, too.
 
     `inner` says of each lobe whether it is of another interface than the first. `light` is known at `cosines` after
     `INCIDENCES`.
@@ -61,18 +62,14 @@ def columns(
     reflected, back = wide.fit(light.nodes, beyond, 1.0, wi[0])
     passed, through = wide.fit(light.nodes, passing, bound, internal_reflections.seen_below(transmission, wi)[0])
     back, through = (share * folded.around(each) for each in (back, through))
-    kept = [1 - back if each else 1.0 for each in inner]
     handed = sum((energy for energy, each in zip(found.energies, inner) if each), 0 * found.rest)
     crowded = folded.around(_forward(passed, internal_reflections.seen_below(transmission, folded.at_cosines)))
     narrowed = replace(
         found,
-        weights=[x * weight for x, weight in zip(kept, found.weights)],
-        energies=[x * energy for x, energy in zip(kept, found.energies)],
-        scale=(1 - back) * found.scale,
-        rest=found.rest + back * handed,
-        passes=replace(found.passes.kept(1 - through), forward=through * crowded),
-        wide_reflected=[back * (found.rest + handed), *folded.around(reflected)],
-        wide_passed=[through * found.passed, *folded.around(passed)],
+        passes=replace(found.passes, narrow=1 - through, forward=through * crowded),
+        narrow=1 - back,
+        wide_reflected=[found.rest + handed, *folded.around(reflected)],
+        wide_passed=[found.passed, *folded.around(passed)],
     )
     return narrowed, np.maximum(back, through)
 
@@ -80,9 +77,9 @@ def columns(
 def none(found: Columns) -> Columns:
     """Columns of a side without such light, in the declaration of sides that have some."""
     assert found.passes
-    nothing = [0 * found.rest, *[0 * found.chance] * wide.COUNT]
-    passes = replace(found.passes, forward=0 * found.chance, narrow=0 * found.chance + 1)
-    return replace(found, passes=passes, wide_reflected=nothing, wide_passed=nothing)
+    nothing, whole = [0 * found.rest, *[0 * found.chance] * wide.COUNT], 0 * found.chance + 1
+    passes = replace(found.passes, forward=0 * found.chance, narrow=whole)
+    return replace(found, passes=passes, narrow=whole, wide_reflected=nothing, wide_passed=nothing)
 
 
 def _forward(numbers: Array, i: Direction) -> Array:
@@ -93,7 +90,7 @@ def _forward(numbers: Array, i: Direction) -> Array:
     lit = wide.density([*numbers[..., None]], (length[:, None], 0 * x, i[2][:, None]), (x, y, z))
     known = [forward.moved(float(share), (-1.0, 0.0, 0.0), (x, y, z))[0].mean() for share in FORWARD]
     shares = np.interp((lit * -x).mean(axis=-1), known, FORWARD) / np.maximum(length, STEEP)
-    return np.minimum(shares, FORWARD[-1])
+    return np.minimum(shares, CROWDED_MOST)
 
 
 def shared(found: Columns, shares: Array, view: View, folded: Folded | Listed) -> Columns:

@@ -172,7 +172,8 @@ def tabulated(stack: Stack, material: Material, model: Model, variance: type[Var
     layouts = solver.layouts([_eventful(plain) if general else plain])
     if general and layouts[0].apart and solve.has_one_medium(plain):
         layouts = [replace(layout, alone=True) for layout in layouts]
-    solver = replace(solver, wide=_may_be_wide(plain, layouts[0], variance)) if general else solver.own(plain, layouts)
+    may_be_wide = general and _may_be_wide(plain, layouts[0], variance)
+    solver = replace(solver, wide=may_be_wide) if general else solver.own([plain], layouts)
     found = None if general else solver.solve(plain, layouts)
     rows = None if found is None else _rows(solver, found)
     sides, of_side = [], _colours_of(layouts[0])

@@ -43,7 +43,7 @@ Array = NDArray[np.floating]
 class Parts(ops.NamedFields):
     """Light from one direction that passes: weights (colours) of what goes straight through, of what bounces, and of
     what is scattered, and the probabilities of sampling them; reflected lobes are sampled else. What is scattered has
-    numbers of its own. Where light is wide, what is scattered is drawn `forward`, and lobes keep the share `narrow`."""
+    numbers of its own. Where light is wide, what is scattered is drawn `forward`, and all keep the share `narrow`."""
 
     COLOURS: ClassVar = ("straight", "bounced", "rest")
     CHANCES: ClassVar = ("of_straight", "of_bounced", "of_rest")
@@ -68,9 +68,9 @@ class Parts(ops.NamedFields):
         """Those of diffuse light."""
         return [self.even, self.cosine, self.grazing, self.once, self.twice]
 
-    def kept(self, share: Value) -> Parts:
-        """The parts with a share of their light."""
-        return replace(self, narrow=share, **{name: share * getattr(self, name) for name in self.COLOURS})
+    def narrowed(self) -> Parts:
+        """The parts where what bounces and the rest have their share; of what goes straight, `bsdf` sees to it."""
+        return replace(self, bounced=self.narrow * self.bounced, rest=self.narrow * self.rest)
 
     @property
     def share(self) -> Value:
