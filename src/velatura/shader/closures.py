@@ -229,7 +229,8 @@ def tabulated(material: Material, model: Model, conserving: bool = False) -> Tab
     sides = [material, material.reversed()] if material.transmits else [material]
     etas = [float(np.mean(side.below) / np.mean(side.exterior)) if material.transmits else 1.0 for side in sides]
     each = [_at_nodes(side, model, w, eta, conserving) for side, eta in zip(sides, etas)]
-    bright = [k for k, closures in enumerate(zip(*each)) if max(np.max(c.weight) for c in closures) > FAINT]
+    of_each = enumerate(zip(*each, strict=True))
+    bright = [k for k, closures in of_each if max(np.max(c.weight) for c in closures) > FAINT]
     kept = bright or [0]
     rows = np.array([np.concatenate([_columns(closures[k], variance) for k in kept]).T for closures in each])
     return TabulatedClosures(

@@ -96,7 +96,7 @@ def _turned(roughness: Roughness, angle: float) -> Roughness:
 def _without_steps(material: Material) -> list[int]:
     """Places of interfaces without films between media of one index: nothing reflects there, nor changes below.
 
-    Not of one that ends a medium; and one layer stays.
+    Not of one that ends a medium; and one interface stays where light passes, as only interfaces say that it does.
     """
     found, above = [], material.exterior
     ends_medium = any(isinstance(layer, SlabValues) for layer in material.layers[-2:-1])
@@ -105,7 +105,7 @@ def _without_steps(material: Material) -> list[int]:
             if np.all(layer.eta == above) and not layer.films:
                 found.append(place)
             above = layer.eta
-    return found if len(found) < len(material.layers) else found[:-1]
+    return found[:-1] if material.transmits and len(found) == len(material.interfaces) else found
 
 
 def _with_dark(found: StackLobes, material: Material, model: Model, places: list[int], phi: Array) -> StackLobes:
