@@ -416,6 +416,16 @@ def test_a_sharp_lobe_aslant_is_tested(drawn: tuple[float, float], passes: bool)
     assert "too sharp" not in found.detail
 
 
+def test_a_narrow_beam_among_wide_light_is_resolved() -> None:
+    """Expected: of a slab of fog that 2 % of the light goes straight through, the density integrates to 1 within the
+    error of tables, and samples are tested at all directions."""
+    air = vt.Interface(eta=1.0)
+    report = check(vt.bsdf(vt.Stack([air, vt.Medium(depth=4.0, sigma_s=1.0, g=0.9), air])))
+    assert not report.broken
+    assert report["normalisation"].value < 1e-3
+    assert "too sharp" not in report["chi-square"].detail
+
+
 def test_a_lobe_too_sharp_for_the_cells_is_left_out_however_few_samples_it_gets() -> None:
     """Expected: a tenth of the samples falls into a lobe of .94 by .001, which is no breach; what passes is tested."""
     pane = vt.Stack([vt.Interface(eta=1.5, alpha=(0.94, 0.0))], thin=True)

@@ -198,10 +198,11 @@ def _squared_index(index: float, wi: Array, wo: Array) -> Array:
 def _integrate(probe: Probe, drawn: DrawnSamples, rng: np.random.Generator) -> Integrals:
     # Lay the grids where the pilot's samples fall, on every hemisphere that light may reach
     wo, usable = drawn.samples.wo.reshape(*drawn.arrived.shape, 3), drawn.arrived & ~drawn.delta
+    density = drawn.samples.pdf.reshape(drawn.arrived.shape)
     sides = [[1, -1] if probe.transmits else [int(np.sign(wi[2]))] for wi in drawn.wi]
     grids = [
-        [HemisphereGrid.around(wi, wo[k, :PILOT][usable[k, :PILOT]], side) for side in sides[k]]
-        for k, wi in enumerate(drawn.wi)
+        [HemisphereGrid.around(wi, wo[k, :PILOT][seen], density[k, :PILOT][seen], side) for side in sides[k]]
+        for k, (wi, seen) in enumerate(zip(drawn.wi, usable[:, :PILOT]))
     ]
     counts = [[grid.count(wo[k, PILOT:][usable[k, PILOT:]]) for grid in grids[k]] for k in range(len(grids))]
 

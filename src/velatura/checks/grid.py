@@ -1,10 +1,10 @@
 """Cells on a hemisphere, fine where samples fall, for histograms and for integrals.
 
 Coordinates are the azimuth from the mirror direction and the height 1 - |cos theta|, in which equal areas are equal
-solid angles. Along each axis some lines follow the samples, some their tail, and some are spread evenly: so lobes of
-any width are resolved, and nothing is missed where no sample falls. A column of azimuth has lines of height of its own,
-half of which follow the samples within it, for oblique lobes. (For even sharper ones, .001 by .3, the integrals are
-noisy, and report it.)
+solid angles. Along each axis some lines follow the samples, some those of a high density, some their tail, and some
+are spread evenly: so lobes of any width are resolved, a narrow one among wide light, too, and nothing is missed where
+no sample falls. A column of azimuth has lines of height of its own, half of which follow the samples within it, for
+oblique lobes. (For even sharper ones, .001 by .3, the integrals are noisy, and report it.)
 """
 
 from __future__ import annotations
@@ -38,13 +38,14 @@ class HemisphereGrid:
     rows: Array
 
     @classmethod
-    def around(cls, wi: Array, wo: Array, side: int) -> HemisphereGrid:
-        """The grid for light from wi (3,), fine where the directions wo (n, 3) lie."""
-        azimuth = float(np.arctan2(-wi[1], -wi[0]))
-        phi, height = _coordinates(wo[wo[:, 2] * side > 0], azimuth)
-        columns, everywhere = _lines(phi, -np.pi, np.pi), _lines(height, 0.0, 1.0)
+    def around(cls, wi: Array, wo: Array, density: Array, side: int) -> HemisphereGrid:
+        """The grid for light from wi (3,), fine where the directions wo (n, 3) lie, which have a density (n,)."""
+        azimuth, there = float(np.arctan2(-wi[1], -wi[0])), wo[:, 2] * side > 0
+        (phi, height), density = _coordinates(wo[there], azimuth), density[there]
+        columns, everywhere = _lines(phi, density, -np.pi, np.pi), _lines(height, density, 0.0, 1.0)
         within = np.searchsorted(_bounds(columns), phi, "right")
-        rows = [_lines(height[within == column], 0.0, 1.0) for column in range(CELLS)]
+        own = (within == column for column in range(CELLS))
+        rows = [_lines(height[here], density[here], 0.0, 1.0) for here in own]
         return cls(azimuth, side, columns, np.array([np.sort([*everywhere[1:], *row])[::2] for row in rows]))
 
     def nodes(self, rng: np.random.Generator) -> tuple[Array, Array]:
@@ -89,14 +90,24 @@ def _bounds(lines: Array) -> Array:
     return lines[NODES:-1:NODES]
 
 
-def _lines(samples: Array, low: float, high: float) -> Array:
-    """A third of the lines follow the samples, a third their tail on every scale, a third is spread evenly."""
+def _lines(samples: Array, density: Array, low: float, high: float) -> Array:
+    """A quarter of the lines follow the samples, one those of high density, one their tail on every scale, and one is
+    spread evenly."""
     middle = np.median(samples) if len(samples) else 0.0
     scales = np.resize(_SCALES, len(samples))
     tail = middle + scales * (samples - middle)
     tail = tail[(tail > low) & (tail < high)]
     even = np.linspace(low, high, max(len(samples), 2))
-    ordered = np.sort(np.concatenate([samples, tail, even]))  # quicker than to select so many quantiles
+    # Quicker than to select so many quantiles
+    ordered = np.sort(np.concatenate([samples, _sharpest(samples, density), tail, even]))
     lines = np.interp(np.linspace(0, len(ordered) - 1, CELLS * NODES + 1), np.arange(len(ordered)), ordered)
     lines[0], lines[-1] = low, high
     return lines
+
+
+def _sharpest(samples: Array, density: Array) -> Array:
+    """As many of the samples, each as often as the root of its density says, where that is a number."""
+    order = np.argsort(samples)
+    reached = np.cumsum(np.sqrt(np.nan_to_num(np.maximum(density[order], 0.0), posinf=0.0)))
+    wanted = (np.arange(len(samples)) + 0.5) / max(len(samples), 1) * reached[-1:]
+    return np.asarray(samples[order[np.searchsorted(reached, wanted)]])

@@ -115,7 +115,7 @@ def _integral(probe: Probe, cosine: float, rng: np.random.Generator) -> tuple[fl
     usable = drawn.weight.any(axis=1) & ~drawn.delta
     total, variance = 0.0, 0.0
     for side in (1, -1):
-        wo, areas = HemisphereGrid.around(wi, drawn.wo[usable], side).nodes(rng)
+        wo, areas = HemisphereGrid.around(wi, drawn.wo[usable], drawn.pdf[usable], side).nodes(rng)
         cells, errors = integrate(probe.eval_pdf(np.repeat(wi[None], len(wo), axis=0), wo).pdf * areas)
         total, variance = total + float(cells.sum()), variance + float(errors.sum())
     return total, float(np.sqrt(variance))
