@@ -118,7 +118,7 @@ class PythonPrinter(Printer):
             for name, fields, _ in structs
         )
 
-    def parameters(self, shown: int, remainder: int, layout: int) -> str:
+    def parameters(self, arrays: Sequence[tuple[str, str, int]]) -> str:
         return ""
 
     def material(self, filled: Filled) -> str:

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -13,8 +15,11 @@ from python_printer import PythonPrinter, put, run
 
 import velatura as vt
 from velatura.model import MODELS
-from velatura.shader import constant, record, shader
+from velatura.shader import Shader, constant, record, shader
 from velatura.shader.lookups.bake import LobeLookUp
+from velatura.shader.lookups.lookup import stacked
+from velatura.shader.part import PartCode
+from velatura.stack import Varying
 
 PYTHON = PythonPrinter()
 NAMES = [model.name for model in MODELS]
@@ -127,8 +132,44 @@ def test_weights_are_read_where_the_material_is(tmp_path: Path) -> None:
     assert made.text.count("def vt_part") == 3 * 2  # paint and gold
     with pytest.raises(vt.InvalidInput, match="constant: unknown parameter 'part2_weight'"):
         shader(mix, "weier2020", ["part2_weight"])
-    with pytest.raises(vt.InvalidInput, match="uniforms: only of a single stack"):
-        shader(mix, values="uniforms")
+
+
+def filled(part: PartCode, values: Mapping[str, np.ndarray]) -> np.ndarray:
+    """The lobes of a stack over direction, as its tape gives them: a line for each texel, side and azimuth."""
+    baked = part.recording.baked
+    assert isinstance(baked, LobeLookUp)
+    nodes, sides = baked.nodes, baked.sides
+    x, y = np.meshgrid(*(np.linspace(0, 1, n) for n in (nodes[0], nodes[1] if len(nodes) > 1 else 1)))
+    inputs = {f"m.{place}": values[part.prefix + name] for name, place in part.recording.parameters.items()}
+    inputs |= {"place.x": x.ravel(), "place.y": y.ravel()}
+    columns = [evaluate(baked.columns, {**inputs, "place.z": float(side)}) for side in range(sides)]
+    grid = np.array([[np.broadcast_to(column, x.size) for column in side] for side in columns])
+    return grid.reshape(sides, -1, 4, *x.shape).transpose(1, 0, 3, 4, 2).reshape(-1, nodes[0], 4)
+
+
+def given_uniforms(material: Any, made: Shader, given: Mapping[str, Any]) -> tuple[Any, Any]:
+    """A program whose values change, and its struct with those of a material."""
+    program = run(made.text, **given, vt_parameters=None)
+    parameters, values = program.VtMaterial(), values_of(material)
+    for name, place in made.uniforms.items():
+        if name in values and has(parameters, place):
+            put(parameters, place, values[name])
+    return program, run(made.text, **given, vt_parameters=parameters).vt_material((0.5, 0.5))
+
+
+def has(struct: Any, place: str) -> bool:
+    """Whether a struct has a place, as those that only a tape reads are not in it."""
+    first, _, rest = place.partition(".")
+    return hasattr(struct, first) and (not rest or has(getattr(struct, first), rest))
+
+
+def values_of(material: Any) -> dict[str, np.ndarray]:
+    flat = [
+        (address, np.ravel(constant(address, value)))
+        for address, value in material.values()
+        if not isinstance(value, Varying)
+    ]
+    return {address.name: np.resize(x, (3, 1)) if address.colour else x for address, x in flat}
 
 
 @pytest.mark.parametrize("name", ["coated-gold", "varnished-paint", "frosted-glass"])
@@ -136,27 +177,9 @@ def test_lobes_over_direction_are_read_in_another_language(name: str) -> None:
     """Parameters from a uniform, weights of lobes, and lobes from the texture that the tape fills."""
     stack = vt.preset(name)
     made = shader(stack, "belcour2018", values="uniforms", printer=PYTHON)
-    assert isinstance(made.baked, LobeLookUp)
-    flat = [(address, np.ravel(constant(address, value))) for address, value in stack.values()]
-    values = {address.name: np.resize(x, (3, 1)) if address.colour else x for address, x in flat}
-
-    # Fill the texture as the tape does, a line for each texel, side and azimuth
-    nodes, sides = made.baked.nodes, made.baked.sides
-    x, y = np.meshgrid(*(np.linspace(0, 1, n) for n in (nodes[0], nodes[1] if len(nodes) > 1 else 1)))
-    inputs = {f"m.{place}": values[name] for name, place in made.uniforms.items()}
-    inputs |= {"place.x": x.ravel(), "place.y": y.ravel()}
-    columns = [evaluate(made.baked.columns, {**inputs, "place.z": float(side)}) for side in range(sides)]
-    grid = np.array([[np.broadcast_to(column, x.size) for column in side] for side in columns])
-    vt_baked = grid.reshape(sides, -1, 4, *x.shape).transpose(1, 0, 3, 4, 2).reshape(-1, nodes[0], 4)
-
     shown = np.ones(len(made.shown))
-    given = {"vt_tables": made.tables, "vt_baked": vt_baked, "vt_shown": shown}
-    program = run(made.text, **given, vt_parameters=None)
-    parameters = program.VtMaterial()
-    for name, place in made.uniforms.items():
-        if hasattr(parameters, place.partition(".")[0]):
-            put(parameters, place, values[name])
-    m = run(made.text, **given, vt_parameters=parameters).vt_material((0.5, 0.5))
+    given = {"vt_tables": made.tables, "vt_baked": filled(made.parts[0], values_of(stack)), "vt_shown": shown}
+    program, m = given_uniforms(stack, made, given)
     cos_theta = np.array([0.2, 0.5, 0.9])
     wi = (np.sqrt(1 - cos_theta**2), np.zeros(3), cos_theta)
     expected = vt.lobes(stack, cos_theta=cos_theta, model="belcour2018")
@@ -164,3 +187,29 @@ def test_lobes_over_direction_are_read_in_another_language(name: str) -> None:
     np.testing.assert_allclose([lobe.energy for lobe in lobes.reflected], expected.energy, atol=2e-3)
     shown[0] = 0
     assert not program.vt_lobes(m, wi).reflected[0].energy.any()
+
+
+def test_each_part_of_a_mixture_whose_values_change_reads_its_own(tmp_path: Path) -> None:
+    """Weights and values from a uniform, one within another; weights of lobes and lines of the texture of each part,
+    also of two of the same kind; a mask as a weight."""
+    (tmp_path / "worn.png").touch()
+    mask = {"texture": str(tmp_path / "worn.png")}
+    inner = vt.Mix([(0.2, vt.preset("bare-gold").replace(layer0_alpha=0.4)), (None, "coated-gold")])
+    mix = vt.Mix([(mask, "bare-gold"), (None, inner)])
+    made = shader(mix, "belcour2018", values="uniforms", printer=PYTHON)
+    drawn = [filled(part, values_of(mix)) for part in made.parts]
+    assert list(made.lines) == [0, len(drawn[0]), len(drawn[0]) + len(drawn[1])]
+    shown = {f"vt_{part.prefix}shown": np.ones(len(part.recording.shown)) for part in made.parts}
+    texture = {"vt_map_part0_weight": lambda uv: [0.3, 0.0, 0.0, 1.0]}
+    given = {"vt_tables": made.tables, "vt_baked": stacked(drawn), **shown, **texture}
+    program, m = given_uniforms(mix, made, given)
+    cos_theta = np.array([0.2, 0.5, 0.9])
+    lobes = program.vt_lobes(m, (np.sqrt(1 - cos_theta**2), np.zeros(3), cos_theta))
+    for part, (_, stack), share in zip(made.parts, mix.leaves(), (0.3, 0.14, 0.56)):
+        expected = vt.lobes(stack, cos_theta=cos_theta, model="belcour2018")
+        own = getattr(lobes, part.member)
+        np.testing.assert_allclose(getattr(lobes, f"{part.member}_share"), share, atol=1e-12)
+        np.testing.assert_allclose([lobe.energy for lobe in own.reflected], expected.energy, atol=2e-3)
+    shown["vt_part1_part0_shown"][0] = 0
+    hidden = program.vt_lobes(m, (np.zeros(1), np.zeros(1), np.ones(1)))
+    assert not hidden.part1_part0.reflected[0].energy.any() and hidden.part0.reflected[0].energy.all()

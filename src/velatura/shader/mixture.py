@@ -24,10 +24,12 @@ from velatura.stack.mix import WEIGHT
 @dataclass(frozen=True)
 class Mixture:
     """The stacks of a mixture, with their shares; `own` are the first of each pattern, whose functions those of the
-    same pattern use, and `weights` the flat names of the weights that the code reads."""
+    same pattern use: of each part the number in `functions`; `weights` are the flat names of the weights that the code
+    reads."""
 
     parts: Sequence[PartCode]
     own: Sequence[PartCode]
+    functions: Sequence[int]
     members: Sequence[Member]
     weights: Sequence[str]
 
@@ -37,7 +39,9 @@ class Mixture:
         used = [first.setdefault(part.pattern, part) for part in parts]
         each = zip(parts, used, shares(mix, constant))
         members = [Member(part.member, other.prefix, share) for part, other, share in each]
-        return cls(parts, list(first.values()), members, [at.name for at, _ in weights(mix) if at.name not in constant])
+        own, read = list(first.values()), [at.name for at, _ in weights(mix) if at.name not in constant]
+        functions = [next(k for k, each in enumerate(own) if each is part) for part in used]
+        return cls(parts, own, functions, members, read)
 
     @property
     def values(self) -> Struct:

@@ -12,17 +12,19 @@ import numpy as np
 from numpy.typing import NDArray
 
 from velatura.model import Model
+from velatura.model.papers.lobe_merging import merging
 from velatura.shader import material
 from velatura.shader.lookups import films
 from velatura.shader.printers.printer import Field, Printer, Struct
 from velatura.shader.recorder.cost import Cost, cost
 from velatura.shader.recorder.recording import Recording, record
 from velatura.shader.recorder.seen import part as last
+from velatura.shader.recorder.symbol import LAYOUT, REMAINDER, SHOWN
 from velatura.stack import Stack
 from velatura.stack.flat_names import prefix
 
 _OWN = re.compile(
-    r"\b(?:(vt_)(?=(?:lobes|energies|eval_pdf|eval|pdf|sample|baked_\w+|column|film\d\w*)\b)"
+    r"\b(?:(vt_)(?=(?:lobes|energies|eval_pdf|eval|pdf|sample|baked_\w+|column|film\d\w*|shown|remainder|layout)\b)"
     r"|(Vt)(?=(?:Material|Layer\d+|Lobes?|Energies)\b))"
 )
 
@@ -61,6 +63,23 @@ class PartCode:
         return material.member(self.parts)
 
     # What it reads
+
+    @property
+    def parameters(self) -> list[tuple[str, str, int]]:
+        """The arrays of its own beside the values that change: kind, name and length."""
+        baked, shown = self.recording.baked, len(self.recording.shown)
+        colours, numbers = (baked.colours, baked.numbers) if baked and shown else (0, 0)
+        arrays = ("number", SHOWN, shown), ("colour", REMAINDER, colours), ("number", LAYOUT, numbers)
+        return [(kind, self.named(name), length) for kind, name, length in arrays if length]
+
+    @property
+    def interfaces(self) -> list[list[int]]:
+        """The layers whose light each reflected lobe is, seen from above."""
+        recording, stack = self.recording, self.recording.stack
+        places = stack.surfaces[: len(stack.interfaces)]
+        if recording.energies:
+            return [[place] for place in places]
+        return [[places[k] for k in group] for group in merging(recording.model, len(places))]
 
     @cached_property
     def columns(self) -> NDArray[np.floating] | None:
@@ -127,7 +146,9 @@ class PartCode:
 
     @property
     def pattern(self) -> Hashable:
-        """Equal for stacks whose functions are the same."""
+        """Equal for stacks whose functions are the same; those that read arrays of their own have their own."""
+        if self.recording.shown:
+            return self.parts
         tables = [table.tobytes() for table in (self.columns, *self.films.values()) if table is not None]
         return (self.values, self.lobes, self.lookup(0), self.functions, *tables)
 

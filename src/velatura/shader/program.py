@@ -14,7 +14,6 @@ import numpy as np
 
 from velatura.errors import InvalidInput, remark
 from velatura.model import DEFAULT, SWITCHES, Model, named
-from velatura.model.papers.lobe_merging import merging
 from velatura.shader.lookups import atlas, films
 from velatura.shader.lookups.lookup import LookUp, stacked
 from velatura.shader.material import filled as contents
@@ -24,7 +23,7 @@ from velatura.shader.part import PartCode
 from velatura.shader.printers.glsl import GLSL
 from velatura.shader.printers.printer import Printer
 from velatura.shader.recorder.cost import Cost
-from velatura.shader.recorder.recording import Recording, check_constant
+from velatura.shader.recorder.recording import check_constant
 from velatura.stack import MaterialLike, Mix, Texture, load
 
 PREFIX = "vt"  # of names in code
@@ -37,15 +36,17 @@ class Shader:
     """The code, the names of the tables that it looks up, and its uniforms.
 
     `uniforms` are the values that the struct of the material holds, or that `baked` reads: flat names (`layer0_eta`)
-    and where they lie in the struct (`layer0.eta`). `maps` are the textures of the material by sampler.
+    and where they lie in the struct (`layer0.eta`). `maps` are the textures of the material by sampler. `parts` are the
+    recorded stacks, one or those of a mixture; `lines` are the first line of each in the texture `vt_baked`, of those
+    that share functions the same.
 
-    Where values are parameters: `shown` names the lobes that `vt_shown` weighs, in order, and `baked` is what works out
-    the lobes for the texture `vt_baked`, None where a texture makes them differ from point to point, and of a mixture.
+    Of a stack alone, where values are parameters: `shown` names the lobes that `vt_shown` weighs, in order, and `baked`
+    is what works out the lobes for the texture `vt_baked`, None where a texture makes them differ from point to point.
     A solved material always has one; `columns` is the texture `vt_baked` of known values, float32 of shape (height,
     width, 4).
     `film_tables` names the tables of thin films that the code, or `baked`, looks up in the texture `vt_films`.
-    `lobes` are the layers whose light each reflected lobe is, seen from above, of a stack; `shares` names the energies
-    or chances, fields of `VtLobes`, by which `vt_sample` divides its first number, in order.
+    `lobes` are the layers whose light each reflected lobe is, seen from above; `shares` names the energies or chances,
+    fields of `VtLobes`, by which `vt_sample` divides its first number, in order.
     `costs` are those of `vt_lobes`, `vt_eval_pdf` and `vt_sample`, each called once; `shared` says whether the texture
     of tables is the same for all materials.
     """
@@ -54,10 +55,8 @@ class Shader:
     looked_up: Sequence[str]
     uniforms: Mapping[str, str]
     maps: Mapping[str, Texture]
-    lobes: Sequence[Sequence[int]]
-    shown: Sequence[str]
-    shares: Sequence[str]
-    baked: LookUp | None
+    parts: Sequence[PartCode]
+    lines: Sequence[int]
     columns: np.ndarray | None
     film_tables: Sequence[str]
     films: np.ndarray | None  # their texture, float32 of shape (height, width, 4); None without any
@@ -69,11 +68,33 @@ class Shader:
         """The texture of the tables that are looked up, or of all, float32 of shape (height, width, 4)."""
         return atlas.texture(atlas.every() if self.shared else self.looked_up)
 
+    @property
+    def baked(self) -> LookUp | None:
+        return None if self._alone is None else self._alone.recording.baked
+
+    @property
+    def shown(self) -> Sequence[str]:
+        return [] if self._alone is None else self._alone.recording.shown
+
+    @property
+    def shares(self) -> Sequence[str]:
+        return [] if self._alone is None else self._alone.recording.shares
+
+    @property
+    def lobes(self) -> Sequence[Sequence[int]]:
+        return [] if self._alone is None else self._alone.interfaces
+
+    @property
+    def _alone(self) -> PartCode | None:
+        """The stack, unless it is in a mixture."""
+        return None if self.parts[0].parts else self.parts[0]
+
     @cached_property
     def key(self) -> str:
         """Equal for equal code."""
-        tape = self.baked.tape if self.baked else None
-        return hashlib.sha256(f"{self.text}{tape}".encode()).hexdigest()[:16]
+        looked_up = [part.recording.baked for part in self.parts]
+        tapes = [baked.tape if baked else None for baked in looked_up]
+        return hashlib.sha256(f"{self.text}{tapes}".encode()).hexdigest()[:16]
 
 
 def shader(
@@ -106,13 +127,11 @@ def shader(
         baking: whether lobes are read from a texture over direction for any model, of values that never change.
 
     Raises:
-        InvalidInput: as `record`; a prefix that names cannot begin with; a mixture as `uniforms`.
+        InvalidInput: as `record`; a prefix that names cannot begin with.
     """
     if not _PREFIX.fullmatch(prefix):
         raise InvalidInput(f"prefix: must be letters, digits and single underscores, a letter first, not {prefix!r}")
     material, chosen, general = load(stack), named(model, **switches), values == "uniforms"
-    if general and isinstance(material, Mix):
-        raise InvalidInput("uniforms: only of a single stack, not of a mixture")
     check_constant(material, constant)
     parts = [PartCode.of(path, leaf, chosen, constant, printer, general, baking) for path, leaf in material.leaves()]
     mixture = Mixture.of(material, parts, constant) if isinstance(material, Mix) else None
@@ -126,18 +145,18 @@ def shader(
     placed = films.layouts(tables)
     lines = [0, *accumulate(part.lines for part in own)]
     read = {name for part in parts for name in part.read}.union(mixture.weights if mixture else ())
-    shown, baked = parts[0].recording.shown, None if mixture else parts[0].recording.baked
-    filled = contents(material, read, bool(shown))
+    changing = [array for part in parts for array in part.parameters]
+    filled = contents(material, read, bool(changing))
     costs = mixture.costs if mixture else parts[0].costs
 
     # Print
-    name = "A material" if shown else remark(title(material))
+    name = "A material" if changing else remark(title(material))
     models = " and ".join(dict.fromkeys(described(part.recording.model) for part in parts))
     texts = [
         printer.header(name, models, not read, costs),
         *(part.named(part.values) for part in own),
         *([printer.structs([mixture.values])] if mixture else []),
-        *([printer.parameters(len(shown), *((baked.colours, baked.numbers) if baked else (0, 0)))] if shown else []),
+        *([printer.parameters(changing)] if changing else []),
         printer.material(filled),
         *(part.named(part.lobes) for part in own),
         *([printer.structs([mixture.lobes])] if mixture else []),
@@ -155,10 +174,8 @@ def shader(
         uniforms={name: place for part in parts for name, place in part.uniforms.items()}
         | {name: name for name in (mixture.weights if mixture else ())},
         maps={prefixed(name, prefix): image for name, image in filled.samplers.items()},
-        lobes=[] if mixture else _interfaces(parts[0].recording),
-        shown=shown,
-        shares=[] if mixture else parts[0].recording.shares,
-        baked=baked,
+        parts=parts,
+        lines=[lines[k] for k in (mixture.functions if mixture else [0])],
         columns=stacked([part.columns for part in own if part.columns is not None]),
         film_tables=[layout.name for layout in placed],
         films=films.texture(tables),
@@ -172,14 +189,6 @@ def prefixed(text: str, prefix: str) -> str:
     words = "".join(word[:1].upper() + word[1:] for word in prefix.split("_"))
     names = {"vt_": f"{prefix}_", "Vt": words, "VT_": f"{prefix.upper()}_"}
     return text if prefix == PREFIX else _NAME.sub(lambda found: names[found[1]], text)
-
-
-def _interfaces(recording: Recording) -> list[list[int]]:
-    """The layers whose light each reflected lobe is, seen from above."""
-    places = recording.stack.surfaces[: len(recording.stack.interfaces)]
-    if recording.energies:
-        return [[place] for place in places]
-    return [[places[k] for k in group] for group in merging(recording.model, len(places))]
 
 
 def described(model: Model) -> str:

@@ -243,7 +243,7 @@ def layouts(names: Iterable[str]) -> list[TableLayout]:
 def texture(found: dict[str, Array]) -> Array | None:
     """Tables as their texture, float32 of shape (height, WIDTH, 4); None without any."""
     lines = []
-    for table in found.values():
+    for _, table in sorted(found.items()):  # as `layouts`
         texels = np.pad(table.reshape(-1, 3).astype(np.float32), ((0, 0), (0, 1)))
         lines.append(np.pad(texels, ((0, -len(texels) % WIDTH), (0, 0))).reshape(-1, WIDTH, 4))
     return np.concatenate(lines) if lines else None

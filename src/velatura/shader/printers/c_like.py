@@ -24,7 +24,7 @@ from velatura.shader.material import PARAMETERS, Brushed, Entry, Filled, Mapped
 from velatura.shader.printers.printer import FUNCTIONS, Field, Member, Output, Printer, Struct
 from velatura.shader.printers.statements import assignments, statements
 from velatura.shader.recorder.cost import Cost
-from velatura.shader.recorder.symbol import LAYOUT, REMAINDER, SHOWN, Kind, Operand, Symbol
+from velatura.shader.recorder.symbol import Kind, Operand, Symbol
 from velatura.stack import Texture
 
 #: Places of what a program is given, counted from the first binding.
@@ -236,9 +236,8 @@ class CLike(Printer):
     def structs(self, structs: Sequence[Struct]) -> str:
         return "".join(map(self.struct, structs))
 
-    def parameters(self, shown: int, remainder: int, layout: int) -> str:
-        arrays = ("float", SHOWN, shown), ("vec3", REMAINDER, remainder), ("float", LAYOUT, layout)
-        return self.uniforms(PARAMETERS, [each for each in arrays if each[2]])
+    def parameters(self, arrays: Sequence[tuple[str, str, int]]) -> str:
+        return self.uniforms(PARAMETERS, [(_KINDS[kind], name, length) for kind, name, length in arrays])
 
     def material(self, filled: Filled) -> str:
         maps = [

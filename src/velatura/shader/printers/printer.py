@@ -204,9 +204,9 @@ class Printer(Language):
         """Declarations of structs, each before those that contain it."""
 
     @abstractmethod
-    def parameters(self, shown: int, remainder: int, layout: int) -> str:
-        """The uniforms that change: a material, weights of a number of lobes, and of a solved one a number of colours
-        of its remainders, and of numbers of its layout."""
+    def parameters(self, arrays: Sequence[tuple[str, str, int]]) -> str:
+        """The uniforms that change: a material, and arrays by kind, name and length: weights of lobes, and where it is
+        solved colours of its remainders, and numbers of its layout."""
 
     @abstractmethod
     def material(self, filled: Filled) -> str:
