@@ -19,10 +19,10 @@ const stateOf = (alpha) => ({
 
 /** An answer whose texel is the roughness. */
 function answer({ material }) {
-  const { eta, alpha } = material.layers[0].interface;
+  const { eta, alpha } = (material.mix?.[0].material ?? material).layers[0].interface;
   const encoded = (...numbers) => ({ array: new Float32Array(numbers), shape: [numbers.length] });
   return {
-    ...{ key: 'k', shown: [], films: null },
+    ...{ key: 'k', parts: [{ shown: [] }], films: null },
     values: { exterior: 1, layer0_eta: eta, layer0_alpha_u: alpha, layer0_alpha_v: alpha },
     solution: { texels: encoded(alpha), remainder: encoded(alpha), layout: encoded(0) },
   };
@@ -34,15 +34,15 @@ mock.method(performance, 'now', () => clock);
 const pause = () => new Promise((resolve) => setImmediate(resolve));
 
 /** A picture of a roughness in a held viewport, with the texels that are drawn and the requests that wait. */
-async function held(alpha) {
-  const drawn = [], waiting = [];
+async function held(alpha, shapeOf = stateOf) {
+  const drawn = [], waiting = [], values = [];
   let changed = null;
-  let state = stateOf(alpha);
+  let state = shapeOf(alpha);
   const viewport = {
     ...{ held: true, slots: { a: null }, camera: null },
     ...{ setView: () => {}, setCamera: () => {}, setObject: () => {}, setEnvironment: () => {}, forget: () => {} },
     setMaterial: () => {},
-    setContents: (_, { solution }) => drawn.push(solution.texels.array[0]),
+    setContents: (_, contents) => drawn.push(contents.solution.texels.array[0]) && values.push(contents.values),
   };
   const picture = follow({
     ...{ viewport, session: SESSION, lacks: () => '', onProblem: () => {}, onBaked: () => {}, onShader: () => {} },
@@ -52,12 +52,12 @@ async function held(alpha) {
       verb === 'shader' ? answer(question) : new Promise((resolve) => waiting.push(() => resolve(answer(question)))),
   });
   await pause();
-  const move = (to) => changed((state = stateOf(to)));
+  const move = (to) => changed((state = shapeOf(to)));
   const reply = async () => {
     waiting.shift()();
     await pause();
   };
-  return { picture, drawn, waiting, move, reply };
+  return { picture, drawn, values, waiting, move, reply };
 }
 
 test('values that move are drawn at once where solutions lie beside them, and asked for one at a time', async () => {
@@ -108,5 +108,18 @@ test('Python rests after an answer, while values are foreseen', async () => {
   clock += 101;
   move(0.226);
   assert.equal(waiting.length, 1);
+  picture.stop();
+});
+
+test('shares that move are drawn without a question', async () => {
+  const part = (id, weight) => ({ id, weight, name: '', source: '', thin: false, layers: stateOf(0.1).layers });
+  const mixed = (share) => ({ ...stateOf(0.1), parts: [part(1, share), part(2, null)], part: 1 });
+  const { picture, drawn, values, waiting, move } = await held(0.5, mixed);
+  const before = drawn.length;
+  move(0.4);
+  move(0.3);
+  assert.equal(drawn.length, before + 2);
+  assert.equal(values.at(-1).part0_weight, 0.3);
+  assert.equal(waiting.length, 0);
   picture.stop();
 });

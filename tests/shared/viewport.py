@@ -17,7 +17,7 @@ import numpy as np
 import velatura
 from velatura.editor import messages, service
 from velatura.model import DEFAULT
-from velatura.stack import Stack
+from velatura.stack import Described
 
 PAGE = Path(velatura.__file__).parent / "editor" / "page"
 ESBUILD = PAGE / "node_modules" / ".bin" / "esbuild"
@@ -70,7 +70,7 @@ class Stage:
     page: Any
     errors: list[str] = field(default_factory=list)
 
-    def show(self, stack: Stack, scene: str | None = None, env: str | None = None, model: str = DEFAULT) -> None:
+    def show(self, stack: Described, scene: str | None = None, env: str | None = None, model: str = DEFAULT) -> None:
         """Set a material, and the object and the light where they are others than before."""
         self.page.evaluate(_SHOW, [messages.document(stack), model, scene, env])
 
@@ -134,7 +134,7 @@ class Comparison:
 
 
 def compare(
-    opened: Stage, stack: Stack, scene: str, env: str, samples: int, spp: int, model: str = DEFAULT
+    opened: Stage, stack: Described, scene: str, env: str, samples: int, spp: int, model: str = DEFAULT
 ) -> Comparison:
     """The page's still against Mitsuba's picture of the same: nothing is clipped, and all pixels count."""
     opened.show(stack, scene, env, model)
@@ -142,7 +142,7 @@ def compare(
 
 
 def compared(
-    opened: Stage, stack: Stack, scene: str, env: str, samples: int, spp: int, model: str = DEFAULT
+    opened: Stage, stack: Described, scene: str, env: str, samples: int, spp: int, model: str = DEFAULT
 ) -> Comparison:
     """Compare what is shown already, as `compare` does."""
     half = opened.trace(samples // 2)

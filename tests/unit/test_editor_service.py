@@ -14,7 +14,7 @@ import pytest
 from velatura import lobes, tables
 from velatura.editor import bundle, shading
 from velatura.editor.folder import Conflict, Folder
-from velatura.editor.messages import admitted, document
+from velatura.editor.messages import admitted, document, material_of
 from velatura.editor.service import VERBS
 from velatura.errors import InvalidInput, MissingTool
 from velatura.exports import FORMATS, export
@@ -68,7 +68,7 @@ def test_a_material_is_exported_as_the_command_line_does(to: str) -> None:
 
 def test_a_session_is_json_and_names_all_there_is() -> None:
     session = json.loads(json.dumps(VERBS["session"]({}), allow_nan=False))
-    assert [each["name"] for each in session["presets"]] == list(presets(mixtures=False))
+    assert [each["name"] for each in session["presets"]] == list(presets())
     assert [each["name"] for each in session["models"]] == [model.name for model in MODELS]
     assert session["objects"] == list(OBJECTS)
     assert session["opened"] is None
@@ -112,7 +112,7 @@ def test_parameters_are_those_that_are_declared() -> None:
 
 def test_every_preset_can_be_sent_back() -> None:
     for each in VERBS["session"]({})["presets"]:
-        assert Stack.from_dict(each["material"]) == preset(each["name"])
+        assert material_of({"material": each["material"]}) == preset(each["name"])
 
 
 def test_models_offer_switches_that_they_take() -> None:
@@ -164,15 +164,17 @@ def test_values_are_those_of_the_material() -> None:
     assert made["values"]["layer0_eta"] == [1.4, 1.5, 1.6]
     assert made["values"]["layer0_alpha_u"] == 0.25
     assert made["uniforms"]["layer0_alpha_u"] == "layer0.alpha_u"
-    assert (made["transmitted"], made["base"], made["thin"]) == (False, False, False)
+    (stack,) = made["parts"]
+    assert (stack["transmitted"], stack["base"], stack["thin"]) == (False, False, False)
 
 
 def test_what_is_solved_comes_with_the_code_and_by_itself() -> None:
     """Coarse for what moves: nearly the same, for the same code."""
     made = shader(COAT)
-    assert (made["baked"], made["tables"]) == (None, None)
-    assert made["shares"] == ["reflected[0].chance", "reflected[1].chance", "remainder_chance"]
-    assert made["shown"] == ["reflected[0]", "reflected[1]", "remainder"]
+    (stack,) = made["parts"]
+    assert (stack["baked"], stack["solved"], made["tables"]) == (None, True, None)
+    assert stack["shares"] == ["reflected[0].chance", "reflected[1].chance", "remainder_chance"]
+    assert stack["shown"] == ["reflected[0]", "reflected[1]", "remainder"]
     values = VERBS["values"]({"material": COAT})
     assert values == {key: made[key] for key in ("values", "films", "solution")}
     coarse = VERBS["values"]({"material": COAT, "coarse": True})
@@ -183,6 +185,64 @@ def test_what_is_solved_comes_with_the_code_and_by_itself() -> None:
     assert VERBS["values"]({"material": COAT, "model": "belcour2018"})["solution"] is None
     with pytest.raises(InvalidInput, match="coarse: must be true or false"):
         VERBS["values"]({"material": COAT, "coarse": 1})
+
+
+def test_a_mixture_is_drawn_by_parts() -> None:
+    """Each with its own solution, or what works out its lobes; masks are in the code, shares are values."""
+    rest = {"material": {"layers": [{"diffuse": {"albedo": 0.2}}]}}
+    inner = {"mix": [{"weight": 0.25, "material": COAT}, rest]}
+    made = shader({"mix": [{"weight": 0.5, "material": changed(alpha=[0.1, 0.3])}, {"material": inner}]})
+    assert [part["prefix"] for part in made["parts"]] == ["part0_", "part1_part0_", "part1_part1_"]
+    assert [part["share"] for part in made["parts"]] == ["part0_share", "part1_part0_share", "part1_part1_share"]
+    assert [(part["solved"], bool(part["baked"])) for part in made["parts"]] == [
+        (True, False),
+        (True, False),
+        (False, True),
+    ]
+    height, width = made["texels"]
+    texels = [decoded(made["solution"][f"{prefix}texels"]) for prefix in ("part0_", "part1_part0_")]
+    assert [part["line"] for part in made["parts"]] == [0, len(texels[0]), len(texels[0]) + len(texels[1])]
+    assert width == max(each.shape[1] for each in texels) and height > made["parts"][-1]["line"]
+    own = shader(COAT)
+    np.testing.assert_array_equal(texels[1], decoded(own["solution"]["texels"]))
+    assert made["values"]["part0_weight"] == 0.5 and made["values"]["part1_part0_weight"] == 0.25
+    assert made["values"]["part1_part0_layer0_eta"] == own["values"]["layer0_eta"]
+    other = {"mix": [{"weight": 0.1, "material": changed(alpha=[0.2, 0.2])}, {"material": inner}]}
+    assert shader(other)["key"] == made["key"]  # that is drawn by values alone
+    assert made["closed_form"] is False
+
+
+@pytest.mark.parametrize(
+    ("material", "says"),
+    [
+        ({"mix": [{"material": "gold.yaml"}]}, "material: part 0: material: must be written out here, got 'gold.yaml'"),
+        (
+            {"mix": [{"material": {"mix": [{"material": None}]}}]},
+            "material: part 0: part 0: material: must be written out",
+        ),
+        ({"mix": 3}, "material: mix: must be a list of parts, got 3"),
+        ({"mix": [{"material": COAT}] * 17}, "material: mix: may be 16 parts at most, got 17"),
+        (
+            {"mix": [{"material": {"layers": COAT["layers"] * 25}}]},
+            "material: part 0: layers: may be 48 at most here, got 50",
+        ),
+        ({"mix": [{"weight": 2, "material": COAT}, {"material": COAT}]}, "mix: part 0: weight: must lie in 0 to 1"),
+    ],
+)
+def test_mixtures_that_are_none_are_refused(material: dict[str, Any], says: str) -> None:
+    with pytest.raises(InvalidInput) as refused:
+        VERBS["shader"]({"material": material})
+    assert str(refused.value).startswith(says)
+
+
+def test_what_takes_no_mixture_says_so() -> None:
+    mix = {"mix": [{"weight": 0.5, "material": COAT}, {"material": COAT}]}
+    for verb, body in (("appearance", {}), ("coat", {}), ("film", {"layer": 0, "film": 0, "thickness_nm": 100})):
+        with pytest.raises(InvalidInput, match=r"takes a single stack, not a mixture$"):
+            VERBS[verb]({"material": mix, **body})
+    assert "l.part1_share" in VERBS["export"]({"material": mix, "to": "glsl", "model": "realtime"})["text"]
+    assert "mix:" in VERBS["write"]({"material": mix})["text"]
+    assert VERBS["read"]({"text": VERBS["write"]({"material": mix})["text"], "file": "a.yaml"})["material"] == mix
 
 
 def test_what_is_dragged_is_solved_for_light_from_above() -> None:
@@ -211,6 +271,7 @@ def test_a_drag_takes_over_the_layers_that_it_leaves_alone() -> None:
     answers = [dragged(alpha) for alpha in alphas]
     for alpha, answer in zip(alphas, answers):
         KEPT.clear()
+        shading._solution.cache_clear()
         assert dragged(alpha) == pytest.approx(answer, abs=1e-6)
 
 
@@ -249,7 +310,7 @@ def test_a_film_has_its_colours_over_thickness() -> None:
 def test_tables_are_those_that_are_read(here: Path) -> None:
     """A uniform material is worked out by a tape, which reads tables by name; a textured one by a shader."""
     made = shader(COAT, model="belcour2018")
-    baked = made["baked"]
+    baked = made["parts"][0]["baked"]
     assert (made["tables"], made["solution"]) == (None, None)
     for name in baked["tables"]:
         expected = dict(tables.load().items())[name].data
@@ -259,7 +320,7 @@ def test_tables_are_those_that_are_read(here: Path) -> None:
 
     (here / "pixel.png").write_bytes(PIXEL)
     textured = shader(changed(alpha={"texture": "pixel.png"}))
-    assert textured["baked"] is None
+    assert textured["parts"][0]["baked"] is None
     texture = decoded(VERBS["tables"]({"key": textured["tables"]})["texture"])
     assert texture.shape[1:] == (1024, 4)
     assert np.isfinite(texture).all()
@@ -357,6 +418,20 @@ def test_a_material_is_saved_and_opened_again(here: Path) -> None:
     assert opened == {"material": COAT, "version": saved["version"]}
     verbs["save"]({"file": "coat.json", "material": COAT, "version": None})
     assert json.loads((here / "coat.json").read_text()) == COAT
+
+
+def test_the_mask_of_a_preset_is_read_and_saved_beside_the_file(here: Path) -> None:
+    folder, material = Folder(), document(preset("worn-painted-steel"))
+    mask = material["mix"][0]["weight"]["texture"]
+    image = folder.picture(mask).read_bytes()
+    for name in (mask.replace("wear.png", "worn-painted-steel.yaml"), "../wear.png", str(here / "wear.png")):
+        with pytest.raises(InvalidInput, match=r"must be the plain name|must end in"):
+            folder.picture(name)
+    folder.verbs["save"]({"file": "worn.yaml", "material": material})
+    assert (here / "wear.png").read_bytes() == image
+    saved = folder.verbs["open"]({"file": "worn.yaml"})["material"]
+    assert saved["mix"][0]["weight"]["texture"] == "wear.png"
+    assert saved["mix"][1] == material["mix"][1]
 
 
 def test_of_two_that_save_the_second_is_told() -> None:

@@ -19,7 +19,7 @@ from velatura.errors import InvalidInput
 pytestmark = pytest.mark.skipif(not bundle.finding().ok, reason="the page is not built")
 
 BAD = [
-    ("stack", 3, "stack: must be a Stack, its fields, a file or the name of a preset, got 3"),
+    ("stack", 3, "stack: must be a Stack, a Mix, the fields of one, a file or the name of a preset, got 3"),
     ("stack", "no-such", "unknown preset 'no-such'"),
     ("stack", {"layers": []}, "layers: must hold at least one layer"),
     ("model", "no-such", "unknown model 'no-such'"),

@@ -100,10 +100,10 @@ def test_a_tape_runs_as_numpy_does(k: int) -> None:
     np.testing.assert_allclose(answer["columns"][k], truths[k], rtol=1e-9, atol=1e-12)
 
 
-@pytest.mark.parametrize("name", presets(mixtures=False))
+@pytest.mark.parametrize("name", presets())
 def test_flat_values_are_those_of_the_stack(name: str) -> None:
     """Expected: all but those of films, which shaders have as tables."""
-    found = answered()[0]["values"][presets(mixtures=False).index(name)]
+    found = answered()[0]["values"][presets().index(name)]
     expected = {address.name: (address, value) for address, value in vt.preset(name).values() if address.film is None}
     expected = {key: pair for key, pair in expected.items() if not isinstance(pair[1], Varying)}
     assert set(found) == {key for key in expected if not key.endswith("_conductor")}

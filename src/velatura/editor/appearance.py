@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from velatura.editor.messages import LOBES, Answer, Body, Verb, document, material_of, model_of
+from velatura.editor.messages import LOBES, Answer, Body, Verb, document, model_of, stack_of
 from velatura.errors import InvalidInput, NoSolution
 from velatura.figures.bati2021_targets import FIGURES
 from velatura.inverse import Infeasible, Target, coat, invert_stack, solution
@@ -90,7 +90,7 @@ def described(target: Target) -> Answer:
 
 def appearance(body: Body) -> Answer:
     """A material as a target; if it is not one, `says` is the reason, and the target is for display only."""
-    stack, model = material_of(body), model_of(body)
+    stack, model = stack_of(body, "appearance"), model_of(body)
     if why := _varies(stack):
         return _shown(stack, model, why)
     try:
@@ -363,7 +363,7 @@ def _form(target: Target) -> list[tuple[int, str]]:
 
 def coated(body: Body) -> Answer:
     """A material under a coat, with its appearance kept or not; its own lobe, and the others before and after."""
-    stack, eta, alpha = material_of(body), body.get("eta", 1.5), body.get("alpha", 0.0)
+    stack, eta, alpha = stack_of(body, "coat"), body.get("eta", 1.5), body.get("alpha", 0.0)
     if len(stack.layers) > LOBES:
         raise InvalidInput(f"material: layers: may be {LOBES} at most below a coat, got {len(stack.layers)}")
     try:

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from velatura import kernel
-from velatura.editor.messages import Answer, Body, array, material_of, model_of
+from velatura.editor.messages import Answer, Body, array, model_of, stack_of
 from velatura.editor.validation_page import Slider, Validation, alpha_slider, answer_of, axis_of, curve_of, in_words
 from velatura.errors import InvalidInput
 from velatura.optics import fresnel
@@ -30,7 +30,7 @@ def chosen_interface(body: Body) -> tuple[Stack, int]:
     Raises:
         InvalidInput: no material, or not an interface.
     """
-    stack, layer = material_of(body), body.get("layer")
+    stack, layer = stack_of(body, "validation"), body.get("layer")
     if layer is None or layer >= len(stack.layers) or not isinstance(stack.layers[layer], Interface):
         raise InvalidInput(f"layer: must be the number of an interface of the material, got {layer!r}")
     return stack, layer

@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from velatura.editor.messages import Answer, Body, Verb, array, field, material_of
+from velatura.editor.messages import Answer, Body, Verb, array, field, stack_of
 from velatura.errors import InvalidInput
 from velatura.shader.lookups.films import coated_layers
 from velatura.stack import srgb_sensitivity
@@ -16,7 +16,7 @@ COLOURS = 128  # over the range of thickness
 
 def film(body: Body) -> Answer:
     """Reflectance at the normal (COLOURS, 3), linear, for thicknesses from 0 to `thickness_nm` of a film of a layer."""
-    stack, layer, chosen = material_of(body), field(body, "layer", int), field(body, "film", int)
+    stack, layer, chosen = stack_of(body, "films"), field(body, "layer", int), field(body, "film", int)
     thickest_nm = field(body, "thickness_nm", float)
     written = getattr(stack.layers[layer], "films", ()) if layer < len(stack.layers) else ()
     if chosen >= len(written):

@@ -14,8 +14,8 @@ from pathlib import Path
 from velatura.editor.messages import TEXT, Answer, Body, Verb, admitting, document, field, to_write
 from velatura.errors import InvalidInput
 from velatura.files import whole
-from velatura.stack import dumps, single
-from velatura.stack.paths import beside
+from velatura.stack import dumps, load
+from velatura.stack.paths import beside, is_of_presets
 
 #: Bytes of the largest file that is read, and of the largest request.
 LARGEST = 32 * 2**20
@@ -47,10 +47,10 @@ class Folder:
         Raises:
             InvalidInput: no such material.
         """
-        stack, path = single(material, "the editor"), Path(material).resolve()
+        found, path = load(material), Path(material).resolve()
         if path.is_file() and path.parent == self.path and path.suffix.lower() in MATERIALS:
             return {**self.opened({"file": path.name}), "file": path.name}
-        return {"material": document(stack), "file": None, "version": None}
+        return {"material": document(found), "file": None, "version": None}
 
     # Verbs -----------------------------------------------------------------------------------------------------------
 
@@ -66,7 +66,7 @@ class Folder:
         if path.stat().st_size > TEXT:
             raise InvalidInput(f"{path.name}: a material file may have {TEXT >> 10} KiB at most here")
         version = _version(path)
-        return {"material": document(single(os.path.relpath(path), "the editor")), "version": version}
+        return {"material": document(load(os.path.relpath(path))), "version": version}
 
     def saved(self, body: Body) -> Answer:
         """Write a material; Conflict unless the file has the version given, None for a file that is not there."""
@@ -75,7 +75,7 @@ class Folder:
         format, material = "json" if path.suffix.lower() == ".json" else "yaml", to_write(body)
         with self.writing:
             self._check_version(path, body.get("version"))
-            with beside(material, self.path) as placed:
+            with beside(material, self.path, presets=True) as placed:
                 _write(path, dumps(placed, format, self.path).encode())
             return {"file": name, "version": _version(path)}
 
@@ -115,6 +115,17 @@ class Folder:
         if not inside:
             raise InvalidInput(f"{name}: must be a file of the folder, and no link out of it")
         return path
+
+    def picture(self, name: str) -> Path:
+        """The path of a picture that a material reads: one of this folder, or one that comes with the presets.
+
+        Raises:
+            InvalidInput: as `existing`.
+        """
+        path = self.path / name
+        if path.suffix.lower() in PICTURES and is_of_presets(path) and path.is_file():
+            return path
+        return self.existing(name, PICTURES)
 
     def existing(self, name: str, endings: Sequence[str]) -> Path:
         """The path of an existing file. Raises InvalidInput as `place`, and where it is missing or too large."""

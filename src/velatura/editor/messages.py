@@ -20,7 +20,8 @@ from numpy.typing import ArrayLike
 
 from velatura.errors import InvalidInput
 from velatura.model import DEFAULT, Model, named
-from velatura.stack import Stack, dumps
+from velatura.stack import Described, Stack, dumps, single
+from velatura.stack.mix import MOST, from_dict
 from velatura.stack.schema import Parameter, show
 from velatura.stack.values import THICKEST_NM, Films, Flag, Scalar, Whole
 
@@ -37,7 +38,7 @@ _TYPES: dict[Any, str] = {
 }
 
 LAYERS, LOBES = 48, 16  # of a material, and of a target
-DEEPEST = 16  # lists and objects in one another
+DEEPEST = 24  # lists and objects in one another
 BIGGEST = 1e30  # number, which single precision holds
 DIGITS = 8  # of values in files, all that single precision has
 TEXT = 2**18  # characters of a material file
@@ -51,9 +52,14 @@ def field(body: Body, key: str, kind: type, default: Any = None) -> Any:
     return value
 
 
-def material_of(body: Body) -> Stack:
-    """The stack that a body describes under `material`."""
-    return Stack.from_dict(field(body, "material", dict))
+def material_of(body: Body) -> Described:
+    """The stack or the mixture that a body describes under `material`."""
+    return from_dict(field(body, "material", dict))
+
+
+def stack_of(body: Body, what: str) -> Stack:
+    """The stack under `material`, for what takes no mixture. Raises InvalidInput where it is one."""
+    return single(material_of(body), what)
 
 
 def model_of(body: Body) -> Model:
@@ -117,6 +123,32 @@ class Fields(Parameter):
         return value
 
 
+@dataclass(frozen=True)
+class Written(Fields):
+    """A material: a stack, or a mixture whose materials are written out, as none is read from a file here."""
+
+    def check(self, value: Any) -> dict[str, Any]:
+        checked = super().check(value)
+        for number, part in enumerate(_parts(checked)):
+            material = part.get("material") if isinstance(part, dict) else None
+            if not isinstance(material, dict):
+                raise ValueError(f"part {number}: material: must be written out here, got {show(material)}")
+            try:
+                self.check(material)
+            except ValueError as error:
+                raise ValueError(f"part {number}: {error}") from None
+        return checked
+
+
+def _parts(material: dict[str, Any]) -> list[Any]:
+    parts = material.get("mix", [])
+    if not isinstance(parts, list):
+        raise ValueError(f"mix: must be a list of parts, got {show(parts)}")
+    if len(parts) > MOST:
+        raise ValueError(f"mix: may be {MOST} parts at most, got {len(parts)}")
+    return parts
+
+
 class Size(Parameter):
     """A number of pixels, or of both sides."""
 
@@ -159,7 +191,7 @@ def _point(name: str, value: Any) -> list[float]:
 
 #: The allowed values of the keys of all bodies; null is the same as a missing key.
 KEYS: dict[str, Parameter] = {
-    "material": Fields("of a material", entries="layers", most=LAYERS),
+    "material": Written("of a material", entries="layers", most=LAYERS),
     "target": Fields("of a target", entries="lobes", most=LOBES),
     "read": Fields("of the lobes that a material has", entries="lobes", most=LOBES),
     "model": Words("of a model"),
@@ -225,19 +257,19 @@ def _check_plain(key: str, value: Any, depth: int = 1) -> None:
 # What answers hold ---------------------------------------------------------------------------------------------------
 
 
-def document(stack: Stack) -> Answer:
-    """A stack as a body holds it."""
-    fields: Answer = json.loads(dumps(stack, "json", "."))
+def document(material: Described) -> Answer:
+    """A material as a body holds it."""
+    fields: Answer = json.loads(dumps(material, "json", "."))
     return fields
 
 
-def to_write(body: Body) -> Stack:
-    """The stack of a body with DIGITS digits of every value, where these make a stack: files are read by people."""
-    stack = material_of(body)
+def to_write(body: Body) -> Described:
+    """The material of a body with DIGITS digits of every value, where these make one: files are read by people."""
+    material = material_of(body)
     try:
-        return Stack.from_dict(_rounded(stack.to_dict()))
+        return from_dict(_rounded(material.to_dict()))
     except InvalidInput:  # of a value beside the excluded end of its range
-        return stack
+        return material
 
 
 def _rounded(value: Any) -> Any:

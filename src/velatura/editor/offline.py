@@ -208,6 +208,7 @@ def _common(refusals: Mapping[Order, str], models: Sequence[Model]) -> dict[str,
     offered = {
         "models": [each for each in begun["models"] if each["name"] in names],
         "environments": environments,
+        "presets": [each for each in begun["presets"] if "mix" not in each["material"]],
         "orders": {order.name: refusal for order, refusal in refusals.items()},
     }
     objects = {f"{DATA}/object/{name}.pack": packed(VERBS["object"]({"name": name})) for name in OBJECTS}
@@ -235,15 +236,21 @@ def _shader(model: str, order: Order) -> Made:
     """The shaders of an order of layers in closed form: that which the page draws, and that which it exports."""
     chosen, stack = named(model), order.stack
     drawn = in_closed_form(stack, chosen, order.brushed)
-    written = shader(pattern(stack, order.brushed), chosen.surrogate)
+    written = shader(pattern(stack, [order.brushed]), chosen.surrogate)
     costs = {name: str(cost) for name, cost in written.costs.items()}
     exported = {"text": headed(written.text), "tables": ",".join(written.looked_up) or None, "costs": costs}
-    names = [*written.looked_up, *(drawn["tables"] or "").split(","), *(drawn["baked"] or {}).get("tables", [])]
+    names = [*written.looked_up, *_looked_up(drawn)]
     made = {"shader": drawn, "glsl": exported}
     return Made(
         {f"{DATA}/{verb}/{model}/{order.name}.pack": packed(answer) for verb, answer in made.items()},
         frozenset(filter(None, names)),
     )
+
+
+def _looked_up(drawn: Answer) -> list[str]:
+    """The names of tables that the shader of a stack, or what works out its lobes, looks up."""
+    (stack,) = drawn["parts"]
+    return [*(drawn["tables"] or "").split(","), *(stack["baked"] or {}).get("tables", [])]
 
 
 def _solved(model: str, name: str) -> Made:
@@ -264,7 +271,7 @@ def _coated(model: Model, name: str) -> Made:
             found[place] = packed({"refused": str(error)})
             continue
         found[place] = packed(drawn)
-        looked_up |= {*(drawn["tables"] or "").split(","), *(drawn["baked"] or {}).get("tables", [])} - {""}
+        looked_up |= {*_looked_up(drawn)} - {""}
     return Made(found, frozenset(looked_up))
 
 

@@ -27,7 +27,7 @@ from starlette.types import ASGIApp
 from starlette.websockets import WebSocket, WebSocketDisconnect
 
 from velatura.editor import bundle, guard
-from velatura.editor.folder import LARGEST, PICTURES, Conflict, Folder
+from velatura.editor.folder import LARGEST, Conflict, Folder
 from velatura.editor.guard import Guard, refusal
 from velatura.editor.messages import Answer, Body, Verb, field
 from velatura.editor.service import VERBS
@@ -125,7 +125,7 @@ def application(material: str | None, token: str) -> Guard:
 
     def picture(request: Request) -> Response:
         try:
-            return FileResponse(folder.existing(request.path_params["name"], PICTURES))
+            return FileResponse(folder.picture(request.path_params["name"]))
         except InvalidInput as error:
             return refusal(404, str(error))
 

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import functools
 import re
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import numpy as np
@@ -37,7 +37,10 @@ from velatura.scenes.environments import PHOTOGRAPHS, sky, studio
 from velatura.scenes.objects import OBJECTS, ground, plinth
 from velatura.scenes.surfaces import Mesh
 from velatura.stack import (
+    Described,
+    Mix,
     Named,
+    Part,
     Stack,
     Substance,
     Texture,
@@ -48,7 +51,6 @@ from velatura.stack import (
     preset,
     presets,
     rgb,
-    single,
     substances,
 )
 from velatura.stack.layers import LAYERS, LayerRecord, has
@@ -115,7 +117,7 @@ def _constants() -> Answer:
         "version": __version__,
         "schema": {where: _keys(model) for where, model in _RECORDS.items()},
         "layers": {name: _layer(layer) for name, layer in LAYERS.items()},
-        "presets": [_preset(name) for name in presets(mixtures=False)],
+        "presets": [_preset(name) for name in presets()],
         "models": [_model(model) for model in MODELS],
         "default_model": DEFAULT,
         "formats": [
@@ -131,6 +133,7 @@ def _constants() -> Answer:
 
 _RECORDS: dict[str, type[Record]] = {
     "material": Stack,
+    "part": Part,
     **LAYERS,
     "film": Film,
     "texture": Texture,
@@ -177,9 +180,13 @@ def _titled(name: str) -> str:
 
 
 def _preset(name: str) -> Answer:
-    stack = preset(name)
-    group = "Glass" if stack.transmits else "Paint" if stack.base else "Metal"
-    return {"name": name, "title": stack.name or _titled(name), "group": group, "material": document(stack)}
+    material: Described = preset(name)
+    group = "Mixture" if isinstance(material, Mix) else _group(material)
+    return {"name": name, "title": material.name or _titled(name), "group": group, "material": document(material)}
+
+
+def _group(stack: Stack) -> str:
+    return "Glass" if stack.transmits else "Paint" if stack.base else "Metal"
 
 
 def _model(model: Model) -> Answer:
@@ -217,8 +224,20 @@ def values(body: Body) -> Answer:
     return contents(material_of(body), model_of(body), _stretched(body), field(body, "coarse", bool, False))
 
 
-def _stretched(body: Body) -> bool:
-    written = (entry.get("interface") or {} for entry in body["material"]["layers"])
+def _stretched(body: Body) -> list[bool]:
+    return [_is_stretched(stack) for stack in _written(body["material"])]
+
+
+def _written(material: Answer) -> Iterator[Answer]:
+    """The stacks of a material as the page has written them."""
+    if "mix" not in material:
+        yield material
+    for part in material.get("mix", ()):
+        yield from _written(part["material"])
+
+
+def _is_stretched(stack: Answer) -> bool:
+    written = (entry.get("interface") or {} for entry in stack["layers"])
     return any(isinstance(keys.get("alpha"), list) for keys in written)
 
 
@@ -239,7 +258,7 @@ def read(body: Body) -> Answer:
     """The material in a text, YAML or JSON; errors name the file that it was in."""
     name = field(body, "file", str, "the text")
     material = loads(field(body, "text", str), name if name.isprintable() else repr(name))
-    return {"material": document(single(material, "the editor"))}
+    return {"material": document(material)}
 
 
 def write(body: Body) -> Answer:

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from velatura import kernel
 from velatura.editor.messages import Answer, Body, Verb, array, material_of, model_of
 from velatura.errors import InvalidInput
-from velatura.stack import Stack
+from velatura.stack import Described
 
 LARGEST = 512  # pixels along a side
 MOST = 2**21  # samples of one call
@@ -27,7 +27,7 @@ def truth(body: Body) -> Answer:
     """
     from velatura import scenes
 
-    stack = material_of(body)
+    material = material_of(body)
     name, environment = body.get("object"), body.get("environment", "studio")
     if name not in scenes.OBJECTS:
         raise InvalidInput(f"object: must be one of {', '.join(scenes.OBJECTS)}, got {name!r}")
@@ -47,13 +47,13 @@ def truth(body: Body) -> Answer:
     rotation = math.fmod(body.get("rotation", 0), 360)
     many = model_of(body).microsurface
     return {
-        "picture": array(_rendered(stack, many, name, environment, (size[0], size[1]), camera, rotation, spp, seed))
+        "picture": array(_rendered(material, many, name, environment, (size[0], size[1]), camera, rotation, spp, seed))
     }
 
 
 @kernel.exclusive
 def _rendered(
-    stack: Stack,
+    material: Described,
     microsurface: bool,
     name: str,
     environment: str,
@@ -67,7 +67,7 @@ def _rendered(
     from velatura.api import bsdf
 
     mi = kernel.mitsuba()
-    scene = scenes.scene_dict(name, environment, bsdf(stack, "reference", microsurface=microsurface), size)
+    scene = scenes.scene_dict(name, environment, bsdf(material, "reference", microsurface=microsurface), size)
     scene["light"] = scenes.emitter(mi, environment, rotation)
     scene["sensor"] |= {
         "to_world": mi.ScalarTransform4f().look_at(camera["origin"], camera["target"], [0, 1, 0]),

@@ -3,19 +3,18 @@
 from __future__ import annotations
 
 import contextvars
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
-from pathlib import Path
 from typing import Any
 from urllib.parse import unquote
 
 from velatura.editor import bundle
-from velatura.editor.folder import PICTURES, Conflict, Folder
+from velatura.editor.folder import Conflict, Folder
 from velatura.editor.messages import Answer, admitted, document, field, material_of, model_of
 from velatura.editor.service import FILES, VERBS
 from velatura.errors import InvalidInput, VelaturaError, needs
 from velatura.model import DEFAULT, SWITCHES, Model, named
-from velatura.stack import MaterialLike, Stack, single
+from velatura.stack import Described, MaterialLike, load
 from velatura.stack.schema import show, unknown
 
 with needs("notebook"):
@@ -41,10 +40,13 @@ class ReadTrait(traitlets.TraitType):
 # Values --------------------------------------------------------------------------------------------------------------
 
 
-def _stack(value: Any) -> Stack:
+def _stack(value: Any) -> Described:
     if isinstance(value, MaterialLike):
-        return single(value, "the editor")
-    raise InvalidInput(f"stack: must be a Stack, its fields, a file or the name of a preset, got {show(value)}")
+        found: Described = load(value)
+        return found
+    raise InvalidInput(
+        f"stack: must be a Stack, a Mix, the fields of one, a file or the name of a preset, got {show(value)}"
+    )
 
 
 def _model(value: Any) -> Model:
@@ -62,14 +64,14 @@ def _height(value: Any) -> int:
 # Values as the page has them -----------------------------------------------------------------------------------------
 
 
-def _written(stack: Stack, editor: Editor) -> Answer:
-    """A stack for the page: in its own words where it is the page's, which hears of no change then."""
+def _written(stack: Described, editor: Editor) -> Answer:
+    """A material for the page: in its own words where it is the page's, which hears of no change then."""
     described, fields = editor._described
     return fields if stack == described else document(stack)
 
 
-def _described(fields: Answer, editor: Editor) -> Stack:
-    """The page's stack; while that is invalid, which the page reports, the last valid one."""
+def _described(fields: Answer, editor: Editor) -> Described:
+    """The page's material; while that is invalid, which the page reports, the last valid one."""
     try:
         stack = material_of(admitted({"material": fields}))
     except InvalidInput:
@@ -105,7 +107,7 @@ class Editor(anywidget.AnyWidget):
     working directory.
 
     Args:
-        stack: a Stack, its fields as a mapping, a file or the name of a preset.
+        stack: a Stack or a Mix, its fields as a mapping, a file or the name of a preset.
         model: a named model, or a Model with other switches.
         height: of the cell, in pixels.
 
@@ -123,11 +125,11 @@ class Editor(anywidget.AnyWidget):
 
     def __init__(
         self,
-        stack: Stack | Mapping[str, Any] | str | Path | None = None,
+        stack: MaterialLike | None = None,
         model: str | Model = DEFAULT,
         height: int = 640,
     ) -> None:
-        self._described: tuple[Stack | None, Answer] = None, {}
+        self._described: tuple[Described | None, Answer] = None, {}
         self._folder = Folder()
         self._verbs = {**VERBS, **self._folder.verbs}
         self._threads = ThreadPoolExecutor(THREADS)
@@ -166,4 +168,4 @@ class Editor(anywidget.AnyWidget):
         """The content at an address of the server: an environment, or a texture of the folder."""
         if address in FILES:
             return FILES[address].read_bytes()
-        return self._folder.existing(unquote(address.removeprefix("/files/")), PICTURES).read_bytes()
+        return self._folder.picture(unquote(address.removeprefix("/files/"))).read_bytes()

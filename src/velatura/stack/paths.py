@@ -17,6 +17,8 @@ from velatura.files import content, whole
 from velatura.stack import substances
 from velatura.stack.schema import Record
 
+_PRESETS = Path(os.path.realpath(__file__)).parent / "presets"
+
 M = TypeVar("M", bound=Record)  # a material
 
 KEYS = ("texture", "spectrum", "table", "refractiveindex", "pigment", "material")  # of paths
@@ -57,22 +59,30 @@ def hold(data: bytes, name: str, ending: str) -> Path:
     return path
 
 
-def held(material: Record) -> list[str]:
-    """The paths of the images of a material that `hold` has made."""
+def is_of_presets(path: str | Path) -> bool:
+    """Whether a file lies beside the presets of the package."""
+    return Path(os.path.realpath(path)).parent == _PRESETS
+
+
+def held(material: Record, presets: bool = False) -> list[str]:
+    """The paths of the images of a material that `hold` has made, and of those that come with the `presets`."""
     found: list[str] = []
     rewritten(material.to_dict(), lambda path: found.append(path) or path)  # type: ignore[func-returns-value]
-    return [path for path in dict.fromkeys(found) if Path(path).parent == _folder()]
+    return [
+        path for path in dict.fromkeys(found) if Path(path).parent == _folder() or (presets and is_of_presets(path))
+    ]
 
 
 @contextlib.contextmanager
-def beside(material: M, folder: Path) -> Iterator[M]:
-    """A material whose held images have been written into a folder; they are removed again if the block fails.
+def beside(material: M, folder: Path, presets: bool = False) -> Iterator[M]:
+    """A material whose held images, and those that come with the `presets`, have been written into a folder; they are
+    removed again if the block fails.
 
     Raises:
         InvalidInput: an image cannot be written, or another file has its name.
     """
     made: list[Path] = []
-    places = {path: folder.resolve() / Path(path).name for path in held(material)}
+    places = {path: folder.resolve() / Path(path).name for path in held(material, presets)}
     try:
         for path, place in places.items():
             data = Path(path).read_bytes()

@@ -7,7 +7,7 @@ import { Viewport } from './render/viewport.js';
 import { lookAhead } from './state/ahead.js';
 import * as commands from './state/commands.js';
 import { createEdits } from './state/edits.js';
-import { enabled } from './state/material.js';
+import { chosenOf, enabled, leavesOf } from './state/material.js';
 import { createMessages } from './state/messages.js';
 import { follow } from './state/picture.js';
 import { createSnapshots } from './state/snapshots.js';
@@ -75,7 +75,7 @@ export function mount(root, { call, lacks = nothingLacks, live, session, storage
     onShader: update,
     onProblem(about, error) {
       if (!error) return messages.forgive(about);
-      const number = error.message.match(/^layer (\d+)/)?.[1];
+      const number = layerNamed(error.message, store.get());
       const text =
         error instanceof Offline ? 'The server is away: the picture follows when it is back.' : error.message;
       return messages.complain(about, text, { layer: number && enabled(store.get())[number]?.id });
@@ -110,7 +110,7 @@ export function mount(root, { call, lacks = nothingLacks, live, session, storage
   page = createPage({
     ...{ store, session, storage, edits, messages, picture, canvas, focus, update, lacks, toolbar: toolbar.view },
     layers: createLayers({
-      ...{ store, session, lacks, edits, messages, choose, upload: files.upload, focus, update },
+      ...{ store, session, lacks, edits, messages, choose, upload: files.upload, focus, update, mix: toolbar.mix },
       strips: createStrips({ call, lacks, update }),
     }),
     strip: createStrip({ store, snapshots, focus, update }),
@@ -200,6 +200,12 @@ export function mount(root, { call, lacks = nothingLacks, live, session, storage
       element.remove();
     },
   };
+}
+
+/** The number of the layer of the chosen stack that a message of Python begins with. */
+function layerNamed(message, state) {
+  const { prefix } = leavesOf(state)[chosenOf(state)], parts = prefix.replace(/part(\d+)_/g, 'mix: part $1: material: ');
+  return message.startsWith(parts) ? message.slice(parts.length).match(/^layer (\d+)/)?.[1] : undefined;
 }
 
 /** Why something is not there, where all is. */

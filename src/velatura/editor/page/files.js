@@ -4,7 +4,8 @@ import { readPicture } from './render/environment.js';
 import { loadObject } from './render/load.js';
 import { objectOf } from './render/loader.js';
 import * as commands from './state/commands.js';
-import { documentOf, enabled } from './state/material.js';
+import { documentOf, enabled, leavesOf } from './state/material.js';
+import { mixWith, objectionToMixing } from './state/parts.js';
 import { fragmentOf, readFragment } from './state/share.js';
 
 const LETTERS = 60; // of a file name
@@ -37,10 +38,10 @@ export function createFiles({ store, session, call, storage, messages, address, 
       store.run(commands.openMaterial, material, place);
       messages.say(`Opened ${material.name || 'a material'}.`);
     },
-    /** Begins a new material: a coat over a diffuse base. */
+    /** A new material: a coat over a diffuse base. */
+    fresh: () => ({ layers: ['interface', 'diffuse'].map((kind) => ({ [kind]: session.layers[kind].fresh })) }),
     begin() {
-      const layers = ['interface', 'diffuse'].map((kind) => ({ [kind]: session.layers[kind].fresh }));
-      store.run(commands.openMaterial, { layers });
+      store.run(commands.openMaterial, files.fresh());
       messages.say('A new material, not in a file yet.');
     },
     openFile: (file) =>
@@ -48,13 +49,21 @@ export function createFiles({ store, session, call, storage, messages, address, 
         const { material, version } = await call('open', { file });
         files.open(material, { file, version });
       }),
-    readFile: (file) =>
+    readFile: (file, take = files.open) =>
       messages.attempt('open', async () => {
-        files.open((await call('read', { text: await file.text(), file: file.name })).material);
+        take((await call('read', { text: await file.text(), file: file.name })).material);
       }),
+    /** Puts a material beside the open one, on a share of the surface. */
+    mix(material) {
+      const wrong = objectionToMixing(store.get(), material);
+      if (wrong) return messages.complain('mix', wrong, { passing: true });
+      store.run(mixWith, material);
+      return messages.say(`Mixed with ${material.name || 'a material'}.`);
+    },
+    mixFile: (file) => messages.attempt('open', async () => files.mix((await call('open', { file })).material)),
     async save(file, version) {
       const material = documentOf(store.get());
-      const off = store.get().layers.length - enabled(store.get()).length;
+      const off = leavesOf(store.get()).reduce((sum, { layers }) => sum + layers.length - enabled({ layers }).length, 0);
       try {
         const answer = await call('save', { file, material, version });
         store.aside(commands.saved, material, answer.file, answer.version);

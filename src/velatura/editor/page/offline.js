@@ -5,7 +5,7 @@ import { decode } from './arrays.js';
 import { Offline, Refused } from './connection.js';
 import { Recent } from './recent.js';
 import { check } from './state/check.js';
-import { flat, layersOf, variantOf } from './state/material.js';
+import { flat, stateOf, variantOf } from './state/material.js';
 import { contentsOf } from './state/picture.js';
 import { through } from './state/share.js';
 
@@ -40,7 +40,7 @@ export async function connectFiles(folder) {
     } catch ({ message }) {
       throw refused(message);
     }
-    return { exterior: 1, thin: false, ...material, layers: layersOf(material) };
+    return stateOf(material);
   }
 
   /** The preset of a model that is solved, as it was solved; else the shader in closed form, as it is for `coarse`. */

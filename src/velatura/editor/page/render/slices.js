@@ -9,15 +9,15 @@ export const radians = (angle) => (angle * Math.PI) / 180;
 export const degrees = (angle) => (angle * 180) / Math.PI;
 
 /**
- * Parts of the light, in the order of all answers: reflected lobes seen from above, then the remainder of a solved
+ * Parts of the light of a stack, as `parts` of call("shader") have it, in the order of all answers: reflected lobes seen from above, then the remainder of a solved
  * material, what is transmitted, or the diffuse base; each `{kind, place, layers}`, and in the code its `energy`, and
  * the `lobe` that has its roughness, if any.
  */
-export function partsOf({ shown, lobes, solution }) {
+export function partsOf({ shown, lobes, solved }) {
   return shown.map((place, k) => {
     const kind = place.startsWith('reflected') ? 'reflected' : place;
-    const isLobe = kind === 'reflected' || (kind === 'transmitted' && !solution);
-    const energy = solution ? `energies[${k}]` : `l.${kind === 'base' ? 'base_energy' : `${place}.energy`}`;
+    const isLobe = kind === 'reflected' || (kind === 'transmitted' && !solved);
+    const energy = solved ? `energies[${k}]` : `l.${kind === 'base' ? 'base_energy' : `${place}.energy`}`;
     return { kind, place, layers: lobes[k]?.layers ?? [], energy, lobe: isLobe ? `l.${place}` : null };
   });
 }
@@ -25,7 +25,7 @@ export function partsOf({ shown, lobes, solution }) {
 /**
  * All slices for light from one direction: `angle` degrees from the normal, at an `azimuth` in degrees, from
  * above or `below`. They are drawn by the code that the picture is drawn with; `state` is that of the page whose
- * values are drawn.
+ * values are drawn. Of a mixture they are those of the stack that has a `number` among its stacks.
  */
 export class Slices {
   slot;
@@ -44,23 +44,24 @@ export class Slices {
   #table = null; // lobes over the angle of incidence, as drawnTable has them
   #kept = new Map();
 
-  constructor(slot, { angle, azimuth, below }, state) {
+  constructor(slot, { angle, azimuth, below }, state, number) {
     this.slot = slot;
     this.state = state;
     this.shader = slot.shader;
+    this.stack = slot.shader.parts[number];
     this.angle = angle;
     this.azimuth = azimuth;
-    this.below = below && slot.shader.transmitted;
-    this.parts = partsOf(slot.shader);
+    this.below = below && this.stack.transmitted;
+    this.parts = partsOf(this.stack);
     this.#device = slot.device;
     this.#values = slot.contents.values;
     const incidence = { vt_angle: angle, vt_azimuth: radians(azimuth), vt_side: this.below ? -1 : 1 };
-    this.#uniforms = { ...slot.uniforms(), ...incidence, vt_shown: this.only(null) };
+    this.#uniforms = { ...slot.uniforms(), ...incidence, ...this.only(null) };
   }
 
   /** Waits for the programs, and for the data of most plots; a disc is drawn on demand. */
   async ready() {
-    const texts = [lobesProgram(this.shader, this.parts), valuesProgram(this.shader)];
+    const texts = [lobesProgram(this.shader, this.stack, this.parts), valuesProgram(this.shader, this.stack)];
     const programs = await Promise.all(texts.map((text) => this.#device.program(text)));
     for (const program of programs) await this.#device.warm(program, this.#known, 'RGBA32F');
     [this.#lobesProgram, this.#valuesProgram] = programs;
@@ -70,7 +71,7 @@ export class Slices {
 
   /** Weights that leave one part alone, or all for null. */
   only(part) {
-    return this.parts.map((_, k) => (part === null || part === k ? 1 : 0));
+    return { [`vt_${this.stack.prefix}shown`]: this.parts.map((_, k) => (part === null || part === k ? 1 : 0)) };
   }
 
   /**
@@ -118,7 +119,7 @@ export class Slices {
    */
   async drawnPolar() {
     const { angles } = this.directions();
-    const rows = [null, ...this.parts.keys()].map((part) => ({ vt_disc: 0, vt_shown: this.only(part) }));
+    const rows = [null, ...this.parts.keys()].map((part) => ({ vt_disc: 0, ...this.only(part) }));
     const pixels = await this.drawn(this.#valuesProgram, angles.length, rows.length, rows);
     const length = 4 * angles.length;
     const [all, ...parts] = rows.map((_, k) => colours(pixels.subarray(k * length, (k + 1) * length)));
@@ -137,7 +138,7 @@ export class Slices {
   }
 
   spread() {
-    const whole = this.shader.transmitted ? 180 : 90;
+    const whole = this.stack.transmitted ? 180 : 90;
     const even = Array.from({ length: (2 * whole) / STEP + 1 }, (_, i) => i * STEP - whole);
     const { angle } = this;
     const axes = this.refracted === null ? [angle] : [angle, 180 - this.refracted];
@@ -147,7 +148,7 @@ export class Slices {
 
   /** Degrees between the normal and refracted light beyond the stack; null where there is none. */
   get refracted() {
-    if (!this.shader.transmitted) return null;
+    if (!this.stack.transmitted) return null;
     const ratio = this.relativeIndex();
     const sine = Math.sin(radians(this.angle)) / (this.below ? 1 / ratio : ratio);
     return sine < 1 ? degrees(Math.asin(sine)) : null;
@@ -155,10 +156,11 @@ export class Slices {
 
   /** Of the medium below over that above, one for all colours. */
   relativeIndex() {
-    if (this.shader.thin) return 1;
-    const last = this.shader.lobes.flatMap(({ layers }) => layers).reduce((a, b) => Math.max(a, b), 0);
-    const index = [this.#values[`layer${last}_eta`]].flat();
-    return index.reduce((sum, value) => sum + value, 0) / index.length / this.#values.exterior;
+    const { thin, lobes, prefix } = this.stack;
+    if (thin) return 1;
+    const last = lobes.flatMap(({ layers }) => layers).reduce((a, b) => Math.max(a, b), 0);
+    const index = [this.#values[`${prefix}layer${last}_eta`]].flat();
+    return index.reduce((sum, value) => sum + value, 0) / index.length / this.#values[`${prefix}exterior`];
   }
 
   /**
@@ -166,7 +168,7 @@ export class Slices {
    * or all.
    */
   disc(size, reflected, part = null) {
-    const uniforms = { vt_disc: reflected ? 1 : -1, vt_size: size, vt_shown: this.only(part) };
+    const uniforms = { vt_disc: reflected ? 1 : -1, vt_size: size, ...this.only(part) };
     return this.once(`disc ${size} ${reflected} ${part}`, () => {
       const target = this.target(this.#valuesProgram, size, size, [uniforms]);
       const pixels = this.#device.read(target);
@@ -211,8 +213,15 @@ const colours = (pixels) =>
 
 // Code ------------------------------------------------------------------------------------------------
 
+/** The name of a struct of a stack: in a mixture it has that of the part. */
+const struct = (name, prefix) =>
+  `Vt${prefix.split('_').map((word) => word.charAt(0).toUpperCase() + word.slice(1)).join('')}${name.slice(2)}`;
+
+/** The values of a stack, `m`. */
+const material = (prefix, place) => `${struct('VtMaterial', prefix)} m = vt_material(vec2(0.5))${`.${place}`.slice(0, -1)};`;
+
 /** Two rows for each part, energies and roughnesses; a column for each angle of incidence. */
-const lobesProgram = ({ text, shown, solution }, parts) => `#version 300 es
+const lobesProgram = ({ text }, { prefix, place, solved, shown }, parts) => `#version 300 es
 ${text}
 uniform float vt_angle, vt_azimuth, vt_side;
 out vec4 vt_result;
@@ -221,9 +230,9 @@ void main() {
     int column = int(gl_FragCoord.x);
     float angle = radians(column < ${DEGREES} ? float(column) : vt_angle);
     vec3 wi = vec3(sin(angle) * vec2(cos(vt_azimuth), sin(vt_azimuth)), vt_side * cos(angle));
-    VtMaterial m = vt_material(vec2(0.5));
-    VtLobes l = vt_lobes(m, wi);
-    ${solution ? `vec3 energies[${shown.length}] = vt_energies(m, wi).parts;` : ''}
+    ${material(prefix, place)}
+    ${struct('VtLobes', prefix)} l = vt_${prefix}lobes(m, wi);
+    ${solved ? `vec3 energies[${shown.length}] = vt_${prefix}energies(m, wi).parts;` : ''}
     switch (int(gl_FragCoord.y)) {
 ${parts.map(cases).join('\n')}
     }
@@ -238,7 +247,7 @@ function cases({ energy, lobe }, k) {
 }
 
 /** f cos in the plane of incidence, or over one of the discs. */
-const valuesProgram = ({ text }) => `#version 300 es
+const valuesProgram = ({ text }, { prefix, place }) => `#version 300 es
 ${text}
 uniform highp sampler2D vt_directions;
 uniform float vt_angle, vt_azimuth, vt_side, vt_size;
@@ -257,7 +266,7 @@ void main() {
         if (height <= 0.0) { vt_result = vec4(0.0); return; }
         wo = vec3(place, vt_side * float(vt_disc) * sqrt(height));
     }
-    VtMaterial m = vt_material(vec2(0.5));
-    vt_result = vec4(vt_eval(m, vt_lobes(m, wi), wi, wo), 1.0);
+    ${material(prefix, place)}
+    vt_result = vec4(vt_${prefix}eval(m, vt_${prefix}lobes(m, wi), wi, wo), 1.0);
 }
 `;

@@ -23,6 +23,19 @@ function texelsOf(films) {
   return texels;
 }
 
+/** The weights of all lobes, 0 or 1: of those whose number among all is shown. */
+export function weightsOf({ parts }, isShown) {
+  let number = 0;
+  const weights = (part) => [`vt_${part.prefix}shown`, part.shown.map(() => (isShown(number++) ? 1 : 0))];
+  return Object.fromEntries(parts.map(weights));
+}
+
+/** The entries whose names begin so, without that. */
+function within(named, begin) {
+  const own = Object.entries(named).filter(([name]) => name.startsWith(begin));
+  return Object.fromEntries(own.map(([name, value]) => [name.slice(begin.length), value]));
+}
+
 export class Slot {
   device;
   shader = null; // the answer of call("shader")
@@ -39,9 +52,9 @@ export class Slot {
   #adding = null;
   #learning = null;
   #textures = {}; // by the names of their samplers
-  #bake = null;
+  #bakes = []; // what works out the lobes of each part, or null
   #films = null; // tables of thin films by name: {array, shape}
-  #solved = null; // what Python has worked out: texels, colours of the remainder, numbers of the layout
+  #solved = null; // what Python has worked out of each part: texels, colours of the remainder, numbers of the layout
   #placed = {}; // values by their places in the shader's struct
   #outdated = true; // whether the bake is of other values
   #coarse = false; // whether it is a coarse one
@@ -66,7 +79,7 @@ export class Slot {
     const { device } = this;
     if (this.shader?.key !== shader.key) {
       this.#asked = shader;
-      const baked = shader.baked?.tables ?? [];
+      const baked = [...new Set(shader.parts.flatMap((part) => part.baked?.tables ?? []))];
       const [tracing, lit, tables, looked, maps] = await Promise.all([
         device.program(tracer(shader)),
         device.program(lighting(shader)),
@@ -88,9 +101,8 @@ export class Slot {
   }
 
   #setBake(tables) {
-    const { device, shader } = this, solved = shader.solution?.texels.shape;
-    this.#bake = shader.baked && new Bake(shader.baked, tables);
-    const [height, width] = solved ?? [this.#bake?.height, this.#bake?.width];
+    const { device, shader } = this, [height, width] = shader.texels;
+    this.#bakes = shader.parts.map(({ baked }) => baked && new Bake(baked, tables));
     if (height) this.#textures.vt_baked = device.texture('RGBA32F', width, height);
     if (shader.films) {
       const lines = Object.values(shader.films).reduce((sum, { shape }) => sum + linesOf(shape), 0);
@@ -118,17 +130,36 @@ export class Slot {
 
   /** All that the code of the material reads; lobes are worked out anew where values have changed, maybe `coarse`. */
   uniforms(coarse = false) {
-    if (this.#bake && (this.#outdated || (this.#coarse && !coarse))) {
-      this.device.fill(this.#textures.vt_baked, this.#bake.draw(this.#placed, coarse, this.#films));
+    const isWorkedOut = this.#bakes.some(Boolean);
+    if (this.#outdated ? isWorkedOut || this.#solved : isWorkedOut && this.#coarse && !coarse) {
+      this.device.fill(this.#textures.vt_baked, this.#texels(coarse));
       this.#coarse = coarse;
     }
-    if (this.#solved && this.#outdated) this.device.fill(this.#textures.vt_baked, this.#solved.texels);
     if (this.#films && this.#outdated) this.device.fill(this.#textures.vt_films, texelsOf(this.#films));
     this.#outdated = false;
-    const shown = this.shader.shown.map((_, k) => (this.lobe === null || this.lobe === k ? 1 : 0));
     const parameters = Object.entries(this.#placed).map(([place, value]) => [`vt_parameters.${place}`, value]);
-    const solved = this.#solved && { vt_remainder: this.#solved.remainder, vt_layout: this.#solved.layout };
-    return { ...Object.fromEntries(parameters), ...this.#textures, ...solved, vt_shown: shown };
+    const solved = Object.entries(this.#solved ?? {}).map(([name, value]) => [`vt_${name}`, value]);
+    const values = Object.fromEntries([...parameters, ...solved]);
+    return { ...values, ...this.#textures, ...weightsOf(this.shader, (k) => this.lobe === null || this.lobe === k) };
+  }
+
+  /** The lobes over direction of all parts, one below another. */
+  #texels(coarse) {
+    const { parts, texels: [height, width] } = this.shader;
+    const each = parts.map((part, k) => {
+      const bake = this.#bakes[k];
+      if (!bake) return this.#solved?.[`${part.prefix}texels`] ?? [];
+      const placed = within(this.#placed, part.place), films = this.#films && within(this.#films, part.prefix);
+      return bake.draw(placed, coarse, films);
+    });
+    if (each.length === 1) return each[0];
+    const all = new Float32Array(4 * height * width);
+    each.forEach((texels, k) => {
+      const { line, columns } = parts[k];
+      for (let row = 0; 4 * row * columns < texels.length; row++)
+        all.set(texels.subarray(4 * row * columns, 4 * (row + 1) * columns), 4 * (line + row) * width);
+    });
+    return all;
   }
 
   // The picture

@@ -8,7 +8,8 @@ const SEVERAL = { pair: 2, colour: 3, index: 3 }; // numbers that a parameter ma
 /** Raises Error in one line where a document holds what no material has, or what needs Python. */
 export function check(material, session) {
   const { schema } = session;
-  const { layers, ...whole } = Object(material);
+  const { layers, mix, ...whole } = Object(material);
+  if (mix !== undefined) throw new Error('mixtures need Python: velatura edit');
   if (!Array.isArray(layers) || !layers.length) throw new Error('layers: must hold at least one layer');
   checkKeys('', whole, schema.material, session);
   layers.forEach((entry, index) => {

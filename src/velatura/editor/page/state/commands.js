@@ -1,9 +1,8 @@
 // Commands: pure functions from a state to the next, each with the title that undo shows.
 
 import { besideOf, isPaired, slotBeside } from './compared.js';
-import { documentOf, enabled, indices, isBase, isOpaque, layersOf, metalOf, variantOf } from './material.js';
-
-const titled = (title, command) => Object.assign(command, { title });
+import { documentOf, enabled, indices, isBase, isOpaque, layersOf, leavesOf, metalOf, stateOf, variantOf } from './material.js';
+import { titled } from './store.js';
 
 /** The keys of the state that undo leaves alone. */
 export const OUTSIDE = ['camera', 'disk'];
@@ -64,11 +63,7 @@ const textOf = (state) => JSON.stringify(documentOf(state));
 /** Puts another material in the place of the one that is there. */
 export const setMaterial = titled('change the material', (state, material) => ({
   ...state,
-  name: material.name ?? '',
-  source: material.source ?? '',
-  exterior: material.exterior ?? 1,
-  thin: material.thin ?? false,
-  layers: layersOf(material),
+  ...stateOf(material),
   view: { ...state.view, lobe: null },
 }));
 
@@ -90,7 +85,7 @@ const changed = (state, id, change) => ({
   layers: state.layers.map((layer) => (layer.id === id ? { ...layer, ...change(layer) } : layer)),
 });
 
-const freshId = (state) => Math.max(0, ...state.layers.map(({ id }) => id)) + 1;
+const freshId = (state) => Math.max(0, ...leavesOf(state).flatMap(({ layers }) => layers.map(({ id }) => id))) + 1;
 
 function inserted(state, layer, index) {
   return { ...state, layers: [...state.layers.slice(0, index), layer, ...state.layers.slice(index)] };

@@ -1,6 +1,6 @@
 // What a state compares: the open material with one other, or with some beside it.
 
-const KEPT = ['name', 'source', 'exterior', 'thin', 'layers', 'model', 'switches', 'document'];
+const KEPT = ['name', 'source', 'exterior', 'thin', 'layers', 'parts', 'part', 'model', 'switches', 'document'];
 const BESIDE = ['b', 'c', 'd']; // slots of the viewport
 
 /** Whether a view compares the material with one other, over the whole picture. */

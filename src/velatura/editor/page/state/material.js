@@ -1,25 +1,87 @@
 // A material: layers of the state from and to the document of a file, their flat values, and their shape.
+//
+// The layers of the state are those of a stack. In a mixture this is the chosen one: `parts` is the tree of all, whose
+// nodes are stacks {id, weight, name, source, thin, layers} or mixtures {id, weight, name, source, parts}, and `part` the
+// id of the chosen stack, whose node has the layers of the moment when it was chosen. The last weight among siblings is
+// null: what the others leave.
 
-/** Layers with identities, from the document of a file. */
-export function layersOf(material) {
+/** Layers with identities, from the document of a stack; the first is numbered `first`. */
+export function layersOf(material, first = 1) {
   return material.layers.map((entry, index) => {
     const [[kind, keys]] = Object.entries(entry);
-    return { id: index + 1, kind, enabled: true, keys: keys ?? {} };
+    return { id: first + index, kind, enabled: true, keys: keys ?? {} };
   });
 }
+
+/** What the state has of the document of a file: `{name, source, exterior, thin, layers, parts, part}`. */
+export function stateOf(material) {
+  const { name = '', source = '', mix } = material, exterior = exteriorOf(material);
+  if (!mix) return { name, source, exterior, thin: material.thin ?? false, layers: layersOf(material), parts: null, part: null };
+  const parts = nodesOf(mix, 0), [{ id, thin, layers }] = stacksOf(parts);
+  return { name, source, exterior, thin, layers, parts, part: id };
+}
+
+/** The nodes of the parts that a mixture's document lists; ids of parts and layers come after `last`. */
+export function nodesOf(mix, last) {
+  let count = last;
+  const nodeOf = ({ weight = null, material }) => {
+    const node = { id: ++count, weight, name: material.name ?? '', source: material.source ?? '' };
+    if (material.mix) return { ...node, parts: material.mix.map(nodeOf) };
+    const layers = layersOf(material, count + 1);
+    count += layers.length;
+    return { ...node, thin: material.thin ?? false, layers };
+  };
+  return mix.map(nodeOf);
+}
+
+/** The index above a material, which is that of all parts of a mixture. */
+export const exteriorOf = ({ mix, exterior = 1 }) => (mix ? exteriorOf(mix[0].material) : exterior);
+
+/** The nodes of a tree that are stacks. */
+export const stacksOf = (parts) => parts.flatMap((node) => (node.parts ? stacksOf(node.parts) : [node]));
+
+/** The tree of a mixture with the layers of the state in the place of those of the chosen part; null of a stack. */
+export function treeOf({ parts, part, thin, layers }) {
+  const filled = (node) => {
+    if (node.parts) return { ...node, parts: node.parts.map(filled) };
+    return node.id === part ? { ...node, thin, layers } : node;
+  };
+  return parts ? parts.map(filled) : null;
+}
+
+/** The stacks of a material, one or those of a mixture, with how their flat names begin: `{id, prefix, thin, layers}`. */
+export function leavesOf(state) {
+  const within = (parts, begin) =>
+    parts.flatMap((node, k) => {
+      const prefix = `${begin}part${k}_`;
+      return node.parts ? within(node.parts, prefix) : [{ ...node, prefix }];
+    });
+  const { thin, layers } = state;
+  return state.parts ? within(treeOf(state), '') : [{ id: null, prefix: '', thin, layers }];
+}
+
+/** The number of the chosen stack among all. */
+export const chosenOf = (state) => leavesOf(state).findIndex(({ id }) => id === (state.part ?? null));
 
 /** The layers that count. */
 export const enabled = (state) => state.layers.filter((layer) => layer.enabled);
 
 /** The document that a file would hold; layers that are off are not in it. */
 export function documentOf(state) {
-  const { name, source, exterior, thin } = state;
+  const { name, source, exterior } = state;
+  const named = (node) => ({ ...(node.name && { name: node.name }), ...(node.source && { source: node.source }) });
+  const written = (node) =>
+    node.parts ? { ...named(node), mix: node.parts.map(part) } : { ...named(node), ...stackOf({ ...node, exterior }) };
+  const part = (node) => ({ ...(node.weight !== null && { weight: node.weight }), material: written(node) });
+  return written({ name, source, ...(state.parts ? { parts: treeOf(state) } : state) });
+}
+
+/** The document of the chosen stack, without a name. */
+export function stackOf({ exterior, thin, layers }) {
   return {
-    ...(name && { name }),
-    ...(source && { source }),
     ...(exterior !== 1 && { exterior }),
     ...(thin && { thin }),
-    layers: enabled(state).map(({ kind, keys }) => ({ [kind]: keys })),
+    layers: enabled({ layers }).map(({ kind, keys }) => ({ [kind]: keys })),
   };
 }
 
@@ -64,11 +126,22 @@ export function indices(value, part, names) {
 
 /** Values by flat name, as Stack.flat() has them; what varies over the surface is left out. */
 export function flat(state, { names, schema }) {
-  const values = { exterior: state.exterior };
-  enabled(state).forEach(({ kind, keys }, index) => {
-    for (const [key, value] of numbersOf(keys, schema[kind], names)) values[`layer${index}_${key}`] = value;
-  });
+  const values = Object.fromEntries(weightsOf(treeOf(state) ?? []).filter(([, weight]) => typeof weight === 'number'));
+  for (const { prefix, layers } of leavesOf(state)) {
+    values[`${prefix}exterior`] = state.exterior;
+    enabled({ layers }).forEach(({ kind, keys }, index) => {
+      for (const [key, value] of numbersOf(keys, schema[kind], names)) values[`${prefix}layer${index}_${key}`] = value;
+    });
+  }
   return values;
+}
+
+/** The weights of a tree by flat name, but for the last among siblings: `[name, weight]`. */
+export function weightsOf(parts, begin = '') {
+  return parts.flatMap(({ weight, parts: within }, k) => {
+    const prefix = `${begin}part${k}_`;
+    return [...(weight === null ? [] : [[`${prefix}weight`, weight]]), ...weightsOf(within ?? [], prefix)];
+  });
 }
 
 /** The numbers of a layer, as [key, value], by the kinds of its parameters in the schema. */
@@ -94,13 +167,17 @@ function films({ films = [] }) {
   return [thick.length > 0, thick.some(({ k = 0 }) => [k].flat().some((channel) => channel !== 0))];
 }
 
+/** The stacks of a material without their shares, as text. */
+export const stacksAsText = (state) =>
+  JSON.stringify([state.exterior, ...leavesOf(state).map((leaf) => [leaf.prefix, leaf.thin, enabled(leaf)])]);
+
 /** What decides about the code of a shader, as text; two states of one pattern differ in numbers alone. */
 export function pattern(state) {
   const shape = (value) => {
     if (Array.isArray(value)) return value.length === 2 ? value.map(shape) : 0;
     return value !== null && typeof value === 'object' ? value : 0;
   };
-  const layers = enabled(state).map(({ kind, keys }) => [
+  const ofLayer = ({ kind, keys }) => [
     kind === 'interface' ? (isOpaque({ kind, keys }) ? keys.conductor === 'mirror' : 'dielectric') : kind,
     Object.entries(keys)
       .filter(([key, value]) => key !== 'films' && typeof shape(value) === 'object')
@@ -108,6 +185,7 @@ export function pattern(state) {
     films(keys), // of which code knows no more
     keys.phase ?? 0, // whose asymmetry Python knows
     keys.pigments ?? 0,
-  ]);
-  return JSON.stringify([state.thin, layers]);
+  ];
+  const stacks = leavesOf(state).map(({ prefix, thin, layers }) => [prefix, thin, enabled({ layers }).map(ofLayer)]);
+  return JSON.stringify([stacks, weightsOf(treeOf(state) ?? []).map(([name, weight]) => [name, shape(weight)])]);
 }

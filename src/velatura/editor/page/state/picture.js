@@ -2,7 +2,7 @@
 
 import { Offline } from '../connection.js';
 import { isPaired } from './compared.js';
-import { documentOf, flat, layersOf, pattern } from './material.js';
+import { documentOf, flat, pattern, stacksAsText, stateOf, treeOf, weightsOf } from './material.js';
 import { Solutions } from './solutions.js';
 
 const PAUSE = 250; // milliseconds without a change, after which Python is asked whether values are allowed
@@ -28,6 +28,7 @@ class Slot {
   #moving = false; // whether it is at work on some
   #settled = false; // whether the state is drawn, and not a coarse answer
   #solutions = new Solutions(); // of values that move
+  #contents = null; // what is drawn
   #rest = 0; // time until which Python is not asked for what is foreseen
 
   constructor(name, services) {
@@ -74,10 +75,17 @@ class Slot {
       this.#ask();
     }, PAUSE);
     if (!asks) return this.#setContents(contentsOf(this.shader, state, session), state);
+    if (!this.#contents.coarse && stacksAsText(state) === stacksAsText(this.given)) return this.#weigh(state);
     const found = this.#foresee(state);
     if (found && (found.close || performance.now() < this.#rest)) return;
     this.#moved = { state, shape, question: { material, model, switches, coarse: true } };
     return this.#move();
+  }
+
+  /** Draws other shares of the same stacks, whose solutions stay. */
+  #weigh(state) {
+    const values = { ...this.#contents.values, ...Object.fromEntries(weightsOf(treeOf(state) ?? [])) };
+    this.#setContents({ ...this.#contents, values }, state);
   }
 
   /** Draws values that Python has not worked out, where there are solutions beside them; what was drawn, or null. */
@@ -97,6 +105,7 @@ class Slot {
     const { viewport, onBaked } = this.#services, name = this.#name;
     if (state.document !== this.given?.document) viewport.forget(name);
     viewport.setContents(name, contents);
+    this.#contents = contents;
     this.given = state;
     onBaked(name);
   }
@@ -182,9 +191,7 @@ const isSame = (a, b) => ['origin', 'target', 'fov'].every((key) => String(a[key
 function otherOf(state, session) {
   const { model = session.default_model, switches = {}, material = null } = state.view.other ?? {};
   if (!material) return { ...state, model, switches };
-  const { exterior = 1, thin = false } = material;
-  const pinned = { name: '', source: '', exterior, thin, layers: layersOf(material), document: material };
-  return { ...state, model, switches, ...pinned };
+  return { ...state, model, switches, ...stateOf(material), document: material };
 }
 
 /**
@@ -225,7 +232,7 @@ export function follow({ store, viewport, call, lacks, session, files, onProblem
       mode,
       split,
       tiles: tiles.map(({ slot }) => slot).join(''),
-      lobe: lobe < slots.a.shader?.shown.length ? lobe : null,
+      lobe: lobe < slots.a.shader?.parts.flatMap(({ shown }) => shown).length ? lobe : null,
     });
     once('object', object, async (name) => {
       await viewport.setObject(await files.object(name));

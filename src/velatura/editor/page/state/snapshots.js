@@ -1,7 +1,7 @@
 // The history of the material in pictures: each state that was left alone for a while, to return to.
 
 import { keptOf } from './compared.js';
-import { enabled } from './material.js';
+import { enabled, leavesOf, treeOf, weightsOf } from './material.js';
 
 const MOST = 40;
 const SIZE = [144, 108]; // pixels of a picture
@@ -10,8 +10,10 @@ const CLEAR = 16; // samples from which on a picture is not taken again
 
 /** What decides about the picture of a material, as text. */
 export function lookOf(state) {
-  const layers = enabled(state).map(({ kind, keys }) => [kind, Object.entries(keys).sort()]);
-  return JSON.stringify([state.exterior, state.thin, layers, state.model, Object.entries(state.switches).sort()]);
+  const ofLayer = ({ kind, keys }) => [kind, Object.entries(keys).sort()];
+  const stacks = leavesOf(state).map(({ prefix, thin, layers }) => [prefix, thin, enabled({ layers }).map(ofLayer)]);
+  const weights = weightsOf(treeOf(state) ?? []);
+  return JSON.stringify([state.exterior, stacks, weights, state.model, Object.entries(state.switches).sort()]);
 }
 
 /**

@@ -20,16 +20,22 @@ const between = (a, b, t) =>
     return found * x < 0 && x * b[k] >= 0 ? 0 : found;
   });
 
-/** Mean difference from true numbers, relative to these. */
+/** Mean difference of a solution from the true one, relative to this; of several parts the largest. */
 function errorOf(found, truth) {
-  let sum = 0;
-  for (let k = 0; k < truth.length; k++) sum += Math.abs(found[k] - truth[k]) / (Math.abs(truth[k]) + FAINT);
-  return sum / truth.length;
+  const ofTexels = (name) => {
+    const { array } = truth[name], other = found[name].array;
+    return array.reduce((sum, x, k) => sum + Math.abs(other[k] - x) / (Math.abs(x) + FAINT), 0) / array.length;
+  };
+  return Math.max(...Object.keys(truth).filter((name) => name.endsWith('texels')).map(ofTexels));
 }
+
+/** The layouts of all parts, as text. */
+const layoutsOf = ({ solution }) =>
+  String(Object.entries(solution).flatMap(([name, { array }]) => (name.endsWith('layout') ? [...array] : [])));
 
 /** Contents as call("values") has them, from those of a (0) to those of b (1); null where they are not alike. */
 function mixed(a, b, t) {
-  if (a.films || b.films || String(a.solution.layout.array) !== String(b.solution.layout.array)) return null;
+  if (a.films || b.films || layoutsOf(a) !== layoutsOf(b)) return null;
   const entry = ([name, { array, shape }]) => [name, { array: between(array, b.solution[name].array, t), shape }];
   const value = ([name, x]) => [name, Array.isArray(x) ? between(x, b.values[name], t) : x + t * (b.values[name] - x)];
   return {
@@ -56,7 +62,7 @@ export class Solutions {
     if (!contents.solution) return contents;
     const found = this.foresee(contents.values);
     if (found?.distance) {
-      const { distance } = found, error = errorOf(found.contents.solution.texels.array, contents.solution.texels.array);
+      const { distance } = found, error = errorOf(found.contents.solution, contents.solution);
       this.#reach = error < CLOSE ? Math.max(this.#reach, FURTHER * distance) : distance / 2;
     }
     this.#known.push({ at: numbersOf(contents.values), contents });

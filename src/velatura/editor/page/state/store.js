@@ -2,6 +2,9 @@
 
 const STEPS = 200;
 
+/** A command, with the title that undo shows. */
+export const titled = (title, command) => Object.assign(command, { title });
+
 /**
  * @param {object} present the state to begin with
  * @param {{past?: object[], future?: object[], outside?: string[]}} history steps, nearest last, each

@@ -3,7 +3,7 @@
 import { html, nothing, render } from 'lit-html';
 import { Recent } from '../recent.js';
 import { addCoat, setAppearance, setView } from '../state/commands.js';
-import { documentOf } from '../state/material.js';
+import { documentOf, stackOf } from '../state/material.js';
 import './appearance.css';
 import { createClass } from './appearance/class.js';
 import { described, handles } from './appearance/handles.js';
@@ -54,10 +54,10 @@ export function mountAppearance(element, services) {
 
   const textOf = ({ layers, exterior = 1, thin = false }, { model, switches }) =>
     JSON.stringify([layers, exterior, thin, model, switches]);
-  const now = () => textOf(documentOf(store.get()), store.get());
+  const now = () => textOf(stackOf(store.get()), store.get());
   const question = () => {
     const { model, switches } = store.get();
-    return { material: documentOf(store.get()), model, switches };
+    return { material: stackOf(store.get()), model, switches };
   };
 
   /** Reads the material anew where it is another one. */

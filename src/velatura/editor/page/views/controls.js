@@ -204,7 +204,7 @@ export function texture({ label, value, spec, records, edit }) {
   const choice = (key, options, chosen) =>
     menu({ label: `${label}, ${key}`, value: chosen, options, choose: part(key).set });
   return html`<div class="texture">
-    <span class="file" title=${value.texture}>${value.texture}</span>
+    <span class="file" title=${value.texture}>${value.texture.split('/').at(-1)}</span>
     <div class="pairs">
       <label>scale ${numberField({ label: `${label}, scale`, value: scale, edit: part('scale') })}</label>
       <label>offset ${numberField({ label: `${label}, offset`, value: offset, edit: part('offset') })}</label>

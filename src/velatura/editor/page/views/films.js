@@ -2,7 +2,7 @@
 
 import { html, nothing } from 'lit-html';
 import { addFilm, moveFilm, numberOf, removeFilm, setFilm } from '../state/commands.js';
-import { documentOf } from '../state/material.js';
+import { stackOf } from '../state/material.js';
 import { hex } from './colour.js';
 import { iconButton, styles } from './controls.js';
 import { icons } from './icons.js';
@@ -86,9 +86,8 @@ function strip({ services, layer, film, n, name, act }) {
   const { store, strips, edits } = services, state = store.get();
   if (!layer.enabled || typeof film.thickness_nm !== 'number') return nothing;
   const end = spanOf(film.thickness_nm), neutral = setFilm(state, layer.id, n, 'thickness_nm', end);
-  const { exterior = 1, thin = false, layers } = documentOf(neutral);
   const place = `${layer.id}.${n}`;
-  const asked = { material: { exterior, thin, layers }, layer: numberOf(state, layer.id), film: n, thickness_nm: end };
+  const asked = { material: stackOf(neutral), layer: numberOf(state, layer.id), film: n, thickness_nm: end };
   const colours = strips.of(place, asked);
   if (!colours) return nothing;
   const edit = edits.of(`${layer.id}.film${n}.thickness_nm`, act, `layer.${layer.id}`, layer.id);

@@ -4,7 +4,7 @@ import { html, nothing, render } from 'lit-html';
 import { Slices, radians } from '../render/slices.js';
 import { setView } from '../state/commands.js';
 import { isPaired } from '../state/compared.js';
-import { enabled, layerName } from '../state/material.js';
+import { chosenOf, enabled, layerName, stacksOf } from '../state/material.js';
 import './inspector.css';
 import { chart, valueAt } from './plots/chart.js';
 import { SIZE, colourAt, disc, outline } from './plots/disc.js';
@@ -57,7 +57,13 @@ export function mountInspector(element, { store, session, viewport, call, lacks,
       onCursor: setCursor,
     });
   const isCompared = () => isPaired(store.get().view) && !store.get().view.other?.truth;
-  const showAlone = (k) => store.run(setView, { lobe: store.get().view.lobe === k ? null : k });
+  /** The number of a lobe among those of all parts. */
+  const numberOf = ({ shader, stack }, k) =>
+    shader.parts.slice(0, shader.parts.indexOf(stack)).flatMap(({ shown }) => shown).length + k;
+  const showAlone = (k) => {
+    const number = numberOf(slices.a, k);
+    store.run(setView, { lobe: store.get().view.lobe === number ? null : number });
+  };
 
   /** Draws changes, in every frame in which it is visible. */
   function follow() {
@@ -72,7 +78,7 @@ export function mountInspector(element, { store, session, viewport, call, lacks,
   function slice() {
     for (const name of Object.keys(changed)) {
       const slot = viewport.slots[name];
-      changed[name] ||= slices[name] && slices[name].slot !== slot; // of a device that was lost
+      changed[name] ||= slices[name] && (slices[name].slot !== slot || isOfAnother(name)); // of a device that was lost, or part
       if (name === 'b' && !isCompared()) {
         replace(name, undefined);
         changed[name] = true;
@@ -83,6 +89,8 @@ export function mountInspector(element, { store, session, viewport, call, lacks,
     }
   }
 
+  const isOfAnother = (name) => slices[name].stack !== slices[name].shader.parts[chosenOf(picture.given(name))];
+
   /** Plots come after pictures; while something is dragged they follow. */
   const isTime = () => !viewport.lost && (viewport.held || (viewport.rested(PAUSE) && picture.quiet));
 
@@ -90,7 +98,7 @@ export function mountInspector(element, { store, session, viewport, call, lacks,
     making[name] = true;
     const state = picture.given(name);
     try {
-      const made = await new Slices(slot, local, state).ready();
+      const made = await new Slices(slot, local, state, chosenOf(state)).ready();
       if (viewport.lost || slot !== viewport.slots[name]) changed[name] = true;
       else replace(name, made);
     } catch (error) {
@@ -150,14 +158,21 @@ export function mountInspector(element, { store, session, viewport, call, lacks,
     if (problem) return html`<p class="problem" role="alert">${problem}</p>`;
     if (!slices.a) return html`<p class="waiting">The lobes come with the first picture.</p>`;
     const { plot, read } = PLOTS[local.tab]();
-    return html`${directions()}
+    return html`${partOf(slices.a.state)} ${directions()}
       <div class="plot">${plot}</div>
       <div class="readout">${legend(read)}</div>`;
   }
 
+  /** Which part of a mixture is plotted. */
+  const partOf = ({ parts, part }) => {
+    if (!parts) return nothing;
+    const { name } = stacksOf(parts).find(({ id }) => id === part);
+    return html`<p class="waiting">The plots are of the chosen part alone${name ? `, ${name}` : ''}.</p>`;
+  };
+
   const directions = () => html`<div class="chosen">
     ${slider('Incidence', 'angle', 0, 89)} ${slider('Azimuth', 'azimuth', -180, 180)}
-    ${slices.a.shader.transmitted
+    ${slices.a.stack.transmitted
       ? html`<label><input type="checkbox" .checked=${local.below} @change=${(event) => set({ below: event.target.checked })} />
           from below</label>`
       : nothing}
@@ -189,7 +204,10 @@ export function mountInspector(element, { store, session, viewport, call, lacks,
 
   // The four plots: each a picture, and the numbers at its cursor
 
-  const lobe = () => store.get().view.lobe;
+  const lobe = () => {
+    const { lobe } = store.get().view;
+    return lobe === null ? null : lobe - numberOf(slices.a, 0);
+  };
   const seen = (k) => lobe() === null || lobe() === k;
 
   const PLOTS = {
@@ -198,7 +216,7 @@ export function mountInspector(element, { store, session, viewport, call, lacks,
       const slice = a.polar;
       const beyond = a.parts[lobe()]?.kind === 'transmitted' && a.refracted !== null;
       const cursor = local.cursors.polar ?? (beyond ? 180 - a.refracted : a.angle);
-      const whole = a.shader.transmitted;
+      const whole = a.stack.transmitted;
       const other = b?.polar;
       const place = nearest(slice.angles, cursor);
       const side = Math.abs(cursor) > 90 ? 'transmitted, ' : '';
@@ -227,7 +245,7 @@ export function mountInspector(element, { store, session, viewport, call, lacks,
     disc() {
       const { a, b } = slices;
       const cursor = local.cursors.disc ?? null;
-      const sides = a.shader.transmitted ? [true, false] : [true];
+      const sides = a.stack.transmitted ? [true, false] : [true];
       const pictures = sides.map((reflected) => a.disc(SIZE, reflected, lobe()));
       const which = cursor?.reflected === false && pictures.length > 1 ? 1 : 0;
       const parts = cursor && a.parts.map((_, k) => colourAt(a.disc(SIZE, sides[which], k), cursor.point));
@@ -316,7 +334,7 @@ export function mountInspector(element, { store, session, viewport, call, lacks,
     const azimuth = radians(made.azimuth);
     const angle = reflected ? made.angle : made.refracted;
     if (angle === null) return [];
-    const isOutside = (k) => k === 0 || !made.shader.solution; // other solved lobes have the roughness in their medium
+    const isOutside = (k) => k === 0 || !made.stack.solved; // other solved lobes have the roughness in their medium
     return made
       .chosen()
       .map((part, k) => ({ ...part, k, kind: made.parts[k].kind }))

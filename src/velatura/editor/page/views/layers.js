@@ -20,6 +20,7 @@ import { capital, flag, iconButton, menu, numberField } from './controls.js';
 import { icons } from './icons.js';
 import { followGrip } from './moving.js';
 import { parameter, parametersOf, tintOf } from './parameter.js';
+import { parts } from './parts.js';
 import { text } from './typing.js';
 
 const VARIANTS = [
@@ -41,7 +42,7 @@ export function createLayers(services) {
 function layers(panel) {
   const state = panel.store.get();
   return html`
-    ${top(panel, state)}
+    ${top(panel, state)} ${parts(panel)}
     <ol class="layers">
       ${repeat(
         state.layers,

@@ -23,6 +23,7 @@ const NAMES = {
   albedo: 'Albedo',
   films: 'Thin films',
   thickness_nm: 'Thickness',
+  weight: 'Share',
 };
 const SPANS = { eta: [1, 4], k: [0, 10] }; // where sliders for indices end; fields take any
 const PLAIN = { number: 0, pair: 0.1, angle: 0, colour: 0.5, index: 1.5 }; // in place of a texture
@@ -81,7 +82,7 @@ export function parameter(services, layer, key) {
  * The row of a value of a layer, or of a part of one whose cards are those of its `owner`: `label` says which; `act(value)`
  * is [command, ...args]. `over` lies above the control.
  */
-function row(services, { layer, key, label: part, value, spec, act, owner = layer, over = nothing, ...given }) {
+export function row(services, { layer, key, label: part, value, spec, act, owner = layer, over = nothing, ...given }) {
   const { session, edits } = services, name = NAMES[key] ?? key;
   const label = part ? `${part}, ${name.toLowerCase()}` : name;
   const edit = edits.of(`${layer.id}.${key}`, act, `layer.${owner.id}`, owner.id);
@@ -285,8 +286,8 @@ function phase({ services, layer, label, value, edit, records }) {
 // Textures -------------------------------------------------------------------------------------------
 
 function textured(context) {
-  const { label, spec, edit, records } = context;
-  const act = () => edit.set(PLAIN[spec.kind]);
+  const { label, spec, edit, records, plain = PLAIN[spec.kind] } = context;
+  const act = () => edit.set(plain);
   return {
     control: texture({ ...context, records: records.texture }),
     extras: iconButton({ label: `${label}: remove the texture`, icon: 'remove', act }),

@@ -4,7 +4,7 @@ import { html, nothing } from 'lit-html';
 import { partsOf } from '../render/slices.js';
 import { pin, putBeside, setCamera, setModel, setSwitch, setView, swap } from '../state/commands.js';
 import { isPaired, keptOf, slotBeside } from '../state/compared.js';
-import { enabled, layerName } from '../state/material.js';
+import { chosenOf, enabled, layerName } from '../state/material.js';
 import { capital, dial, menu, number } from './controls.js';
 
 const MODES = [
@@ -65,7 +65,8 @@ function lobes({ store, session, picture }) {
   const { lobe } = store.get().view;
   const shader = picture.shader('a');
   if (!shader) return nothing;
-  const all = enabled(picture.given('a'));
+  const given = picture.given('a'), all = enabled(given), number = chosenOf(given);
+  const first = shader.parts.slice(0, number).flatMap(({ shown }) => shown).length;
   const title = ({ kind, layers }) => {
     if (kind !== 'reflected') return capital(kind);
     return layers.map((number) => `${number} ${layerName(all[number], session.layers)}`).join(', ');
@@ -79,7 +80,7 @@ function lobes({ store, session, picture }) {
       ${text}
     </button>`;
   return html`<div class="choices" role="group" aria-label="Lobes shown">
-    ${button(null, 'All')}${partsOf(shader).map((part, index) => button(index, title(part)))}
+    ${button(null, 'All')}${partsOf(shader.parts[number]).map((part, index) => button(first + index, title(part)))}
   </div>`;
 }
 

@@ -7,7 +7,7 @@ import { isChanged, placeOf } from '../state/commands.js';
 import { iconButton } from './controls.js';
 import { createExports } from './exporting.js';
 
-/** `view()`, and `saveAs()` and `saveAgain()` as its buttons do. */
+/** `view()`, `saveAs()` and `saveAgain()` as its buttons do, and `mix()`, which chooses what the material is mixed with. */
 export function createToolbar(services) {
   const { store, files } = services;
   const dialogs = { open: createRef(), save: createRef() };
@@ -18,13 +18,15 @@ export function createToolbar(services) {
     listed: null, // files of the folder
     targets: null, // of the papers
     sought: '', // in the titles of what can be opened
+    mixing: false, // whether what is chosen is mixed with the material, and not opened
     saveAs: () => dialogs.save.value.showModal(),
     saveAgain() {
       const { file, version } = placeOf(store.get());
       return file ? files.save(file, version) : bar.saveAs();
     },
   };
-  return { view: () => toolbar(bar), saveAs: bar.saveAs, saveAgain: bar.saveAgain };
+  const mix = () => openDialog(bar, true);
+  return { view: () => toolbar(bar), saveAs: bar.saveAs, saveAgain: bar.saveAgain, mix };
 }
 
 function toolbar(bar) {
@@ -69,24 +71,26 @@ const step = (word, icon, act, can, title) =>
 
 // Open -----------------------------------------------------------------------------------------------
 
-async function openDialog(bar) {
+async function openDialog(bar, mixing = false) {
+  bar.mixing = mixing;
   bar.listed = null;
   bar.sought = '';
   bar.update();
   bar.dialogs.open.value.showModal();
   if (!bar.lacks('list')) await bar.messages.attempt('list', async () => (bar.listed = (await bar.call('list', {})).files));
   bar.update();
-  if (!bar.lacks('targets')) await bar.messages.attempt('targets', async () => (bar.targets ??= (await bar.call('targets', {})).targets));
+  if (!mixing && !bar.lacks('targets')) await bar.messages.attempt('targets', async () => (bar.targets ??= (await bar.call('targets', {})).targets));
   bar.update();
 }
 
 function openPanel(bar) {
   const close = () => bar.dialogs.open.value.close();
+  const { mixing } = bar, take = mixing ? bar.files.mix : bar.files.open;
   const sought = bar.sought.trim().toLowerCase();
   const found = (entries) => entries.filter(({ title }) => title.toLowerCase().includes(sought));
   const fromHere = async () => {
     const file = await bar.choose('.yaml,.yml,.json');
-    if (file) bar.files.readFile(file);
+    if (file) bar.files.readFile(file, take);
   };
   const seek = ({ target }) => {
     bar.sought = target.value;
@@ -96,11 +100,11 @@ function openPanel(bar) {
     title,
     group,
     picture: bar.address && new URL(`thumbnails/${name}.jpg`, bar.address).href,
-    act: () => bar.files.open(material),
+    act: () => take(material),
   }));
   const groups = [...new Set(presets.map(({ group }) => group))].sort();
   const targets = (bar.targets ?? []).map((target) => ({ title: target.title, act: () => bar.openTarget(target) }));
-  const listed = (bar.listed ?? []).map((file) => ({ title: file, act: () => bar.files.openFile(file) }));
+  const listed = (bar.listed ?? []).map((file) => ({ title: file, act: () => (mixing ? bar.files.mixFile : bar.files.openFile)(file) }));
   const section = (title, entries, empty = nothing) => html`
     <h2>${title}</h2>
     ${entries.length ? nothing : empty}
@@ -112,15 +116,20 @@ function openPanel(bar) {
     const these = found(entries);
     return these.length || (empty && !sought) ? section(title, these, empty) : nothing;
   };
-  return html`<dialog class="open" aria-label="Open a material" ${ref(bar.dialogs.open)}>
+  return html`<dialog class="open" aria-label=${mixing ? 'Mix with a material' : 'Open a material'} ${ref(bar.dialogs.open)}>
     <div class="head">
       <input type="search" aria-label="Search" placeholder="Search" .value=${live(bar.sought)} @input=${seek} />
+      ${
+        mixing
+          ? html`<button type="button" @click=${() => close() || take(bar.files.fresh())}>A new stack</button>`
+          : nothing
+      }
       <button type="button" @click=${() => close() || fromHere()}>From this computer</button>
       <button type="button" @click=${close}>Cancel</button>
     </div>
     ${groups.map((name) => some(name, byTitle(presets.filter(({ group }) => group === name))))}
     ${some('Files of the folder', listed, html`<p>${bar.lacks('list') || (bar.listed ? 'There are none.' : 'Reading the folder.')}</p>`)}
-    ${some('From the papers', targets, html`<p>${bar.lacks('targets') || 'On their way.'}</p>`)}
+    ${mixing ? nothing : some('From the papers', targets, html`<p>${bar.lacks('targets') || 'On their way.'}</p>`)}
   </dialog>`;
 }
 

@@ -15,15 +15,25 @@ ${blurredEnvironment}
 ${parts(shader)}
 ${OBJECT}`;
 
-/** The parts in the order in which vt_sample divides its first number among them, by energies, or by chances. */
-function parts({ shares }) {
-  const assigned = shares.map((place, k) => `shares[${k}] = whole(l.${place}) + 3e-9;`);
+/**
+ * The parts in the order in which vt_sample divides its first number among them, by energies, or by chances; those of a
+ * stack of a mixture have its share.
+ */
+function parts({ parts }) {
+  const assigned = [];
+  for (const { place, share, shares } of parts) {
+    const own = shares.map((_, k) => `shares[${assigned.length + k}]`);
+    const each = shares.map((name, k) => `${own[k]} = whole(l.${place}${name}) + 3e-9;`);
+    const scaled = own.map((name) => `${name} *= scale;`);
+    if (share) each[each.length - 1] += ` scale = l.${share} / (${own.join(' + ')}); ${scaled.join(' ')}`;
+    assigned.push(...each);
+  }
   return `
-const int PARTS = ${shares.length};
+const int PARTS = ${assigned.length};
 float whole(vec3 energy) { return dot(energy, vec3(1.0)); }
 float whole(float chance) { return chance; }
 float[PARTS] part_shares(VtLobes l) {
-  float shares[PARTS];
+  float shares[PARTS], scale;
   ${assigned.join('\n  ')}
   return shares;
 }

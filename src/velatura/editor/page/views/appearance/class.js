@@ -4,7 +4,7 @@ import { html, nothing } from 'lit-html';
 import { ref } from 'lit-html/directives/ref.js';
 import { decode } from '../../arrays.js';
 import { setMember } from '../../state/commands.js';
-import { layersOf, pattern } from '../../state/material.js';
+import { pattern, stateOf } from '../../state/material.js';
 import { contentsOf } from '../../state/picture.js';
 import { number } from '../controls.js';
 import { mean, shown } from '../plots/scale.js';
@@ -232,7 +232,7 @@ function decoded(answer) {
 async function small({ store, session, call, viewport, picture, isQuiet }, material, samples) {
   const enough = () => viewport.samples >= Math.min(SEEN, viewport.budget.samples);
   while (!isQuiet() || !enough()) await new Promise((resolve) => setTimeout(resolve, IDLE));
-  const state = { ...store.get(), layers: layersOf(material) };
+  const state = { ...store.get(), ...stateOf(material) };
   const { model, switches } = state;
   const known = picture.shader('a');
   const question = { material, model, switches };

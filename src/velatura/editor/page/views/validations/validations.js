@@ -2,7 +2,7 @@
 
 import { html, nothing } from 'lit-html';
 import { decode } from '../../arrays.js';
-import { documentOf, enabled, layerName } from '../../state/material.js';
+import { enabled, layerName, stackOf } from '../../state/material.js';
 import { chart, valueAt } from '../plots/chart.js';
 import { SIZE, disc } from '../plots/disc.js';
 import { lookOf, shown } from '../plots/scale.js';
@@ -39,7 +39,7 @@ export function createValidations({ call, store, session }, paint) {
   /** What is asked of the material, where the page is about one of its interfaces. */
   function question() {
     const { model, switches } = store.get();
-    return { name, material: documentOf(store.get()), layer: place(), model, switches };
+    return { name, material: stackOf(store.get()), layer: place(), model, switches };
   }
 
   const pairs = createPairs({ call, question, paint });

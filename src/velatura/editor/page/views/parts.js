@@ -1,0 +1,131 @@
+// The parts of a mixture: above the layers of the chosen one, each with its share of the surface.
+
+import { html, nothing } from 'lit-html';
+import { repeat } from 'lit-html/directives/repeat.js';
+import { treeOf } from '../state/material.js';
+import {
+  choosePart,
+  duplicatePart,
+  mostOf,
+  movePart,
+  objectionTo,
+  partName,
+  removePart,
+  renamePart,
+  setWeight,
+  sharesOf,
+} from '../state/parts.js';
+import { iconButton, shown } from './controls.js';
+import { icons } from './icons.js';
+import { followGrip } from './moving.js';
+import { row } from './parameter.js';
+import { text } from './typing.js';
+
+/** The list of parts, and a button that mixes the material with another one. */
+export function parts(panel) {
+  const { store, mix, lacks } = panel, tree = treeOf(store.get());
+  const refused = lacks('mix');
+  return html`<section class="mixture" aria-label="Parts of the mixture">
+    ${tree ? list(panel, tree) : nothing}
+    <div class="actions">
+      <button type="button" ?disabled=${refused} title=${refused || 'On a share of the surface, side by side'} @click=${mix}>
+        ${tree ? 'Add a part …' : 'Mix with …'}
+      </button>
+    </div>
+  </section>`;
+}
+
+const list = (panel, siblings) => html`<ol class="parts">
+  ${repeat(
+    siblings,
+    ({ id }) => id,
+    (node, index) => card(panel, siblings, node, index),
+  )}
+</ol>`;
+
+/** A part, and the parts of one that is a mixture itself. */
+function card(panel, siblings, node, index) {
+  const { store, focus } = panel, { part } = store.get();
+  const name = partName(node, index), isChosen = node.id === part;
+  const move = (to) => {
+    const place = Math.max(0, Math.min(siblings.length - 1, to)), wrong = objectionTo(siblings, node.id, place);
+    if (wrong) return panel.messages.complain(`part.${node.id}`, wrong, { passing: true });
+    store.run(movePart, node.id, place);
+    return focus(`[data-part="${node.id}"] > .head .grip`);
+  };
+  const remove = () => {
+    store.run(removePart, node.id);
+    focus('.mixture [aria-pressed="true"], .mixture .actions button');
+  };
+  return html`<li class="part ${isChosen ? 'chosen' : ''}" data-part=${node.id} aria-label=${`Part ${index}: ${name}`}>
+    <div class="head">
+      <button
+        type="button"
+        class="small grip"
+        title="Drag to move; arrow keys move too"
+        aria-label=${`Move ${name}: arrow keys`}
+        @keydown=${(event) => byKey(event, (step) => move(index + step))}
+        @pointerdown=${(event) => followGrip(event, ':scope > .part', { drop: move })}
+      >
+        ${icons.grip}
+      </button>
+      <b class="place" title="Its number in messages">${index}</b>
+      ${
+        isChosen || node.parts
+          ? html`<input
+              type="text"
+              aria-label=${`Name of part ${index}`}
+              placeholder=${name}
+              spellcheck="false"
+              .value=${text(node.name)}
+              @change=${({ target }) => store.run(renamePart, node.id, target.value)}
+            />`
+          : html`<button
+              type="button"
+              class="name"
+              title="Show its layers"
+              @click=${() => store.aside(choosePart, node.id)}
+            >
+              ${name}
+            </button>`
+      }
+      <span class="buttons">
+        ${iconButton({ label: `Duplicate ${name}`, icon: 'duplicate', act: () => store.run(duplicatePart, node.id) })}
+        ${iconButton({ label: `Remove ${name}`, icon: 'remove', act: remove })}
+      </span>
+    </div>
+    ${node.weight === null ? rest(siblings) : weight(panel, siblings, node, name)}
+    ${node.parts ? list(panel, node.parts) : nothing}
+  </li>`;
+}
+
+/** The share of a part: a number up to what the others leave, or a mask. */
+function weight(panel, siblings, node, name) {
+  const spec = panel.session.schema.part.weight, high = mostOf(siblings, node.id);
+  return row(panel, {
+    layer: { id: `part${node.id}`, kind: 'part', keys: { weight: node.weight } },
+    key: 'weight',
+    label: name,
+    value: node.weight,
+    spec: { ...spec, high },
+    act: (next) => [setWeight, node.id, next],
+    span: [0, 1],
+    plain: Math.min(0.5, high),
+  });
+}
+
+/** The share of the last part. */
+function rest(siblings) {
+  const share = sharesOf(siblings).at(-1);
+  const words = typeof share === 'number' ? shown(share) : 'what masks leave';
+  return html`<div class="parameter rest" title="The last part covers what the others leave">
+    <span class="name">Share</span><span class="extras"></span><span class="control">${words}, the rest</span>
+  </div>`;
+}
+
+function byKey(event, move) {
+  const step = { ArrowUp: -1, ArrowDown: 1 }[event.key];
+  if (!step) return;
+  event.preventDefault();
+  move(step);
+}
