@@ -23,7 +23,7 @@ function answer({ material }) {
   const encoded = (...numbers) => ({ array: new Float32Array(numbers), shape: [numbers.length] });
   return {
     ...{ key: 'k', parts: [{ shown: [] }], films: null },
-    values: { exterior: 1, layer0_eta: eta, layer0_alpha_u: alpha, layer0_alpha_v: alpha },
+    values: { exterior: 1, layer0_eta: eta }, // what the code reads, which a roughness is not
     solution: { texels: encoded(alpha), remainder: encoded(alpha), layout: encoded(0) },
   };
 }

@@ -130,7 +130,7 @@ export function flat(state, { names, schema }) {
   for (const { prefix, layers } of leavesOf(state)) {
     values[`${prefix}exterior`] = state.exterior;
     enabled({ layers }).forEach(({ kind, keys }, index) => {
-      for (const [key, value] of numbersOf(keys, schema[kind], names)) values[`${prefix}layer${index}_${key}`] = value;
+      for (const [key, value] of ofLayer(keys, schema[kind], names)) values[`${prefix}layer${index}_${key}`] = value;
     });
   }
   return values;
@@ -144,8 +144,15 @@ export function weightsOf(parts, begin = '') {
   });
 }
 
+/** All numbers of a material, those of films as well, in one order for all of a pattern. */
+export function numbersOf(state, session) {
+  const within = (value) => (typeof value === 'object' ? Object.values(value ?? {}).flatMap(within) : [value].filter(Number.isFinite));
+  const films = leavesOf(state).flatMap((leaf) => enabled(leaf).flatMap(({ keys }) => within(keys.films)));
+  return [...Object.values(flat(state, session)).flat(), ...films];
+}
+
 /** The numbers of a layer, as [key, value], by the kinds of its parameters in the schema. */
-function numbersOf(keys, parameters, names) {
+function ofLayer(keys, parameters, names) {
   const found = Object.entries(parameters).flatMap(([key, { kind, default: standard }]) => {
     const value = keys[key] ?? standard;
     if (kind === 'films' || kind === 'pigments') return [];
@@ -177,7 +184,7 @@ export function pattern(state) {
     if (Array.isArray(value)) return value.length === 2 ? value.map(shape) : 0;
     return value !== null && typeof value === 'object' ? value : 0;
   };
-  const ofLayer = ({ kind, keys }) => [
+  const shapeOf = ({ kind, keys }) => [
     kind === 'interface' ? (isOpaque({ kind, keys }) ? keys.conductor === 'mirror' : 'dielectric') : kind,
     Object.entries(keys)
       .filter(([key, value]) => key !== 'films' && typeof shape(value) === 'object')
@@ -186,6 +193,6 @@ export function pattern(state) {
     keys.phase ?? 0, // whose asymmetry Python knows
     keys.pigments ?? 0,
   ];
-  const stacks = leavesOf(state).map(({ prefix, thin, layers }) => [prefix, thin, enabled({ layers }).map(ofLayer)]);
+  const stacks = leavesOf(state).map(({ prefix, thin, layers }) => [prefix, thin, enabled({ layers }).map(shapeOf)]);
   return JSON.stringify([stacks, weightsOf(treeOf(state) ?? []).map(([name, weight]) => [name, shape(weight)])]);
 }

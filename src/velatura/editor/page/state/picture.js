@@ -2,7 +2,7 @@
 
 import { Offline } from '../connection.js';
 import { isPaired } from './compared.js';
-import { documentOf, flat, pattern, stacksAsText, stateOf, treeOf, weightsOf } from './material.js';
+import { documentOf, flat, numbersOf, pattern, stacksAsText, stateOf, treeOf, weightsOf } from './material.js';
 import { Solutions } from './solutions.js';
 
 const PAUSE = 250; // milliseconds without a change, after which Python is asked whether values are allowed
@@ -90,7 +90,7 @@ class Slot {
 
   /** Draws values that Python has not worked out, where there are solutions beside them; what was drawn, or null. */
   #foresee(state) {
-    const found = this.#solutions.foresee(contentsOf(this.shader, state, this.#services.session).values);
+    const found = this.#solutions.foresee(numbersOf(state, this.#services.session));
     if (found) this.#setContents({ ...found.contents, coarse: true }, state);
     return found;
   }
@@ -119,7 +119,8 @@ class Slot {
       this.#moved = null;
       try {
         const begin = performance.now();
-        const contents = this.#solutions.add(await this.#services.call('values', question));
+        const { call, session } = this.#services;
+        const contents = this.#solutions.add(await call('values', question), numbersOf(state, session));
         const end = performance.now();
         this.#rest = end + REST * (end - begin);
         if (shape !== this.drawn || this.#settled) continue;

@@ -9,7 +9,6 @@ const BEYOND = 2; // distances of two solutions, by which others may lie beyond 
 const LINE = 1e-6; // distance from a line over that along it, of values that lie on it
 const KEPT = 32; // solutions
 
-const numbersOf = (values) => Object.values(values).flat();
 const minus = (a, b) => a.map((x, k) => x - b[k]);
 const dot = (a, b) => a.reduce((sum, x, k) => sum + x * b[k], 0);
 
@@ -55,27 +54,27 @@ export class Solutions {
     this.#reach = 0;
   }
 
-  /** Takes contents as call("values") has them, and returns them decoded. */
-  add(answer) {
+  /** Takes contents as call("values") has them, of a material with these numbers, and returns them decoded. */
+  add(answer, at) {
     const decoded = Object.entries(answer.solution ?? {}).map(([name, x]) => [name, decode(x)]);
     const contents = { ...answer, solution: answer.solution && Object.fromEntries(decoded) };
     if (!contents.solution) return contents;
-    const found = this.foresee(contents.values);
+    const found = this.foresee(at);
     if (found?.distance) {
       const { distance } = found, error = errorOf(found.contents.solution, contents.solution);
       this.#reach = error < CLOSE ? Math.max(this.#reach, FURTHER * distance) : distance / 2;
     }
-    this.#known.push({ at: numbersOf(contents.values), contents });
+    this.#known.push({ at, contents });
     if (this.#known.length > KEPT) this.#known.shift();
     return contents;
   }
 
   /**
-   * Contents for values: `{contents, distance, close}`, from the nearest ones on their line; null where there are none.
-   * They are `close` where others as far from known ones were.
+   * Contents for a material with these numbers: `{contents, distance, close}`, from the nearest ones on their line; null
+   * where there are none. They are `close` where others as far from known ones were.
    */
-  foresee(values) {
-    const at = numbersOf(values), known = this.#known.filter((each) => each.at.length === at.length);
+  foresee(at) {
+    const known = this.#known.filter((each) => each.at.length === at.length);
     if (!known.length) return null;
     const ways = known.map((each) => minus(at, each.at)), lengths = ways.map((way) => Math.sqrt(dot(way, way)));
     const k = lengths.indexOf(Math.min(...lengths)), nearest = known[k], distance = lengths[k];
