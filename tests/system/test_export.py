@@ -29,7 +29,7 @@ from velatura.shader.lookups import atlas
 
 Run = Callable[..., tuple[int, str, str]]
 
-TEXTS = [name for name, each in FORMATS.items() if each.is_text and name not in TARGETS]
+TEXTS = [name for name, each in FORMATS.items() if each.is_text and name not in (*TARGETS, "bsdf-xml")]
 PRESETS = ["coated-gold", "frosted-glass", "varnished-paint", "furnace"]
 
 

@@ -56,6 +56,7 @@ FORMATS: dict[str, Format] = {
     "mitsuba-xml": Format((".xml",), "velatura.exports.mitsuba_xml"),
     "python": Format((".py",), "velatura.exports.python"),
     "bsdf": Format((".bsdf",), "velatura.exports.bsdf", is_text=False),
+    "bsdf-xml": Format((".xml",), "velatura.exports.klems"),
     **{name: Format(baked.endings, "velatura.exports.baked") for name, baked in BAKED.items()},
 }
 
@@ -82,8 +83,8 @@ def export(
         to: one of `FORMATS`: a shader in "glsl" (ES 3.00), "glsl450", "vulkan" (GLSL), "hlsl", "slang" or "wgsl"; a
             shader of closures, "osl", or "blender", a script that makes a material of it; "mtlx", a graph of MaterialX;
             "json", the material with its numbers; "mitsuba-xml", a scene to be included; "python", a script that
-            renders it; "bsdf", a measurement that Mitsuba's plugin `measured` loads; fitted parameters in "openpbr",
-            "gltf", "blender-principled" or "mitsuba-principled".
+            renders it; "bsdf", a measurement that Mitsuba's plugin `measured` loads; "bsdf-xml", matrices for WINDOW
+            and Radiance; fitted parameters in "openpbr", "gltf", "blender-principled" or "mitsuba-principled".
         model: a named model or its name (None for the default), its choices changed by `switches`.
         constant: for shaders, flat names of values that never change (`layer0_eta`), or ["all"].
         prefix: for shaders, begins all names in the code, so that one program may hold several materials; "vt" by
