@@ -90,7 +90,7 @@ def _drawn(body: Body, stack: Stack, statistics: StackLobes, j: int, incident: A
     """
     x, y, z = incident[:, None]
     wi: Direction = (x, y, z)
-    u = at_nodes(1, LIT_SAMPLES, None)
+    u = at_nodes(1, LIT_SAMPLES)
 
     def light(part: int | None) -> LightPoints:
         each = [k == part for k in range(count + 1)]

@@ -68,14 +68,13 @@ def _fixed(*arrays: np.ndarray) -> list[np.ndarray]:
     return list(arrays)
 
 
-def at_nodes(nodes: int, samples: int, number: type | None) -> tuple[Value, Value, Value]:
+def at_nodes(nodes: int, samples: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Three uniform numbers for every sample, the same at all nodes, that fill the cube evenly, the last two the
     square."""
-    index, real = integers(nodes * samples, number)
-    i = index % samples
+    i = np.arange(nodes * samples, dtype=np.uint32) % samples
     # Products of integers that overflow are fractions
-    u_1, u_2 = (real(i * step + 2**31) / 2**32 for step in _OF_32_BITS)
-    return (real(i) + 0.5) / samples, u_1, u_2
+    u_1, u_2 = ((i * step + 2**31) / 2**32 for step in _OF_32_BITS)
+    return (i + 0.5) / samples, u_1, u_2
 
 
 def repeated(values: Value, samples: int) -> Value:

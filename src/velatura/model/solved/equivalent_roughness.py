@@ -65,7 +65,7 @@ def of_lobe(lobe: RefractedLobe, wi: Direction) -> LobeSamples:
 
 def of_passed(transmission: Transmission, parts: Parts, wi: Direction) -> LobeSamples:
     """Samples of light that passes, in the medium beyond, turned up; that of wi is refracted by all interfaces."""
-    u, u1, u2 = low_discrepancy.at_nodes(len(wi[2]), SAMPLES, None)
+    u, u1, u2 = low_discrepancy.at_nodes(len(wi[2]), SAMPLES)
     i, each = _direction(wi), Parts(*map(_each, vars(parts).values()))
     x, y, z = combined.sample(transmission, each, i, u, u1, u2)
     value, density = combined.eval_pdf(transmission, each, i, (x, y, z))

@@ -41,7 +41,7 @@ def factors(
     """
     samples = samples or round(share * next(each for least, each in reversed(SAMPLES.items()) if count > least))
     i = tuple(low_discrepancy.repeated(x, samples) for x in wi)
-    u = low_discrepancy.at_nodes(count, samples, None)
+    u = low_discrepancy.at_nodes(count, samples)
     nodes = np.repeat(np.arange(count), samples)
 
     def kernel(value: Array, reached: Sequence[tuple[Array, Array]]) -> Array:
