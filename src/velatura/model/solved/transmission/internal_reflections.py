@@ -2,7 +2,7 @@
 
 Like reflected light, it is drawn in a medium of its own: a GGX reflection about the momentum p_i of light from wi, in
 the slab where light last bounced or was scattered, let out through the smooth interfaces below. In that slab, of index
-m and cosine c, the widths of all that light meets on its way add as in `straight_through`: of refractions |w_l| a_l,
+m and cosine c, the widths of all that light meets on its way add as in `direct`: of refractions |w_l| a_l,
 as seen at a reflection, 2 m c; a share `BOUNCES` of both faces of the last slab for light that bounces; and for
 scattered light, of optical depth x = tau_s / c, the width of N = x / (1 - exp(-x)) scatterings of asymmetry g^N in all,
 whose median angle theta follows from a fit, as that of a mirror with facets of alpha = tan(theta / 2).
