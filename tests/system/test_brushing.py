@@ -9,6 +9,7 @@ import pytest
 
 import velatura as vt
 from velatura import kernel
+from velatura.renderer.packets import aligned
 from velatura.stack import Brushing, Interface, Stack
 
 mi: Any = kernel.mitsuba("llvm_ad_rgb")
@@ -89,9 +90,10 @@ def test_light_does_not_jump_where_a_round_interface_becomes_brushed(layers: lis
     for up in (1.0, -1.0) if stack.transmits else (1.0,):
         si = dr.zeros(mi.SurfaceInteraction3f, count)
         z, phi = rng.uniform(0.1, 1, count), rng.uniform(0, 2 * np.pi, count)
-        si.wi = mi.Vector3f(np.sqrt(1 - z * z) * np.cos(phi), np.sqrt(1 - z * z) * np.sin(phi), up * z)
+        sine = np.sqrt(1 - z * z)
+        si.wi = mi.Vector3f(*(mi.Float(aligned(x)) for x in (sine * np.cos(phi), sine * np.sin(phi), up * z)))
         u = rng.random((3, count))
-        drawn, _ = round_.sample(context, si, mi.Float(u[0]), mi.Point2f(u[1:]))
+        drawn, _ = round_.sample(context, si, mi.Float(aligned(u[0])), mi.Point2f(u[1:]))
         share = dr.select(drawn.pdf > 0, 1 / (count * dr.maximum(drawn.pdf, 1e-6)), 0)
         before, after = (np.array(dr.mean(x.eval(context, si, drawn.wo)) * share) for x in (round_, brushed_))
         reflected = np.array(drawn.wo.z) * up > 0

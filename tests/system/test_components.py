@@ -9,6 +9,7 @@ import pytest
 
 import velatura as vt
 from velatura import kernel
+from velatura.renderer.packets import aligned
 
 mi = kernel.mitsuba("llvm_ad_rgb")
 import drjit as dr  # noqa: E402
@@ -31,13 +32,15 @@ def context(mask: Any = None, component: int | None = None) -> Any:
 def interactions(wi: Any, count: int = 1) -> Any:
     si = dr.zeros(mi.SurfaceInteraction3f, count)
     si.wi = dr.normalize(mi.Vector3f(wi))
+    dr.make_opaque(si.wi)  # one kernel for all angles
     si.sh_frame, si.n, si.uv = mi.Frame3f([0, 0, 1]), mi.Normal3f(0, 0, 1), mi.Point2f(0.3, 0.6)
     return si
 
 
 def random_directions(count: int, lowest: float) -> Any:
     z, phi = RNG.uniform(lowest, 1, count), RNG.uniform(0, 2 * np.pi, count)
-    return mi.Vector3f(np.sqrt(1 - z * z) * np.cos(phi), np.sqrt(1 - z * z) * np.sin(phi), z)
+    sine = np.sqrt(1 - z * z)
+    return mi.Vector3f(*(mi.Float(aligned(x)) for x in (sine * np.cos(phi), sine * np.sin(phi), z)))
 
 
 def loaded(name: str, plugin: str = "layered", **options: Any) -> Any:
@@ -102,7 +105,7 @@ def test_components_sum_to_the_whole_and_are_sampled_alone(name: str, form: str)
     np.testing.assert_allclose(np.sum([np.array(value) for value, _ in values], axis=0), whole, rtol=1e-4)
 
     # Sample each, and all
-    u1, u2 = mi.Float(RNG.random(n)), mi.Point2f(RNG.random((2, n)))
+    u1, u2 = mi.Float(aligned(RNG.random(n))), mi.Point2f(RNG.random((2, n)))
     drawn = [bsdf.sample(asked, si, u1, u2) for asked in contexts]
     seen = [bsdf.eval_pdf(asked, si, bs.wo) for asked, (bs, _) in zip(contexts, drawn)]
     dr.eval(drawn, seen)
@@ -151,7 +154,7 @@ def test_components_of_the_other_plugins_sum_to_the_whole(plugin: str) -> None:
     kinds = {+Flags.GlossyReflection: 0.05, +Flags.DiffuseReflection: 0.3}
     assert [bsdf.flags(k) & +(Flags.Glossy | Flags.Diffuse) for k in range(bsdf.component_count())] == list(kinds)
     si, wo = interactions([0.6, 0, 0.8], n), random_directions(n, 0.05)
-    u1, u2 = mi.Float(RNG.random(n)), mi.Point2f(RNG.random((2, n)))
+    u1, u2 = mi.Float(aligned(RNG.random(n))), mi.Point2f(RNG.random((2, n)))
     whole, parts = np.array(bsdf.eval(mi.BSDFContext(), si, wo)), np.zeros((3, n))
     for k, (kind, least) in enumerate(kinds.items()):
         asked = context(component=k)
@@ -170,7 +173,7 @@ def test_components_of_the_other_plugins_sum_to_the_whole(plugin: str) -> None:
 @pytest.mark.parametrize("name", ["furnace", "frosted-glass"])
 def test_smooth_and_rough_light_of_the_reference_are_components(name: str) -> None:
     bsdf, n = loaded(name, "layered_reference"), 10_000
-    si, u1, u2 = interactions([0.6, 0, 0.8], n), mi.Float(RNG.random(n)), mi.Point2f(RNG.random((2, n)))
+    si, u1, u2 = interactions([0.6, 0, 0.8], n), mi.Float(aligned(RNG.random(n))), mi.Point2f(RNG.random((2, n)))
     _, whole = bsdf.sample(mi.BSDFContext(), si, u1, u2)
     parts = [bsdf.sample(context(component=k), si, u1, u2)[1] for k in range(bsdf.component_count())]
     np.testing.assert_allclose(np.sum([np.array(part) for part in parts], axis=0), whole, rtol=1e-6)
@@ -179,11 +182,13 @@ def test_smooth_and_rough_light_of_the_reference_are_components(name: str) -> No
 def test_the_component_that_was_drawn_is_as_frequent_as_its_share_of_energy() -> None:
     bsdf, n = loaded("varnished-paint"), 50_000
     si = interactions([0.6, 0, 0.8], n)
-    bs, _ = bsdf.sample(mi.BSDFContext(), si, mi.Float(RNG.random(n)), mi.Point2f(RNG.random((2, n))))
+    bs, _ = bsdf.sample(mi.BSDFContext(), si, mi.Float(aligned(RNG.random(n))), mi.Point2f(RNG.random((2, n))))
     drawn = np.bincount(np.array(bs.sampled_component), minlength=bsdf.component_count()) / n
     means = []
     for k in range(bsdf.component_count()):
-        _, weight = bsdf.sample(context(component=k), si, mi.Float(RNG.random(n)), mi.Point2f(RNG.random((2, n))))
+        _, weight = bsdf.sample(
+            context(component=k), si, mi.Float(aligned(RNG.random(n))), mi.Point2f(RNG.random((2, n)))
+        )
         means.append(np.array(weight).mean())
     # By 5 standard errors, and what lobes lose below the horizon
     np.testing.assert_allclose(drawn, np.array(means) / sum(means), atol=0.015)
@@ -258,7 +263,7 @@ def test_albedo_is_what_leaves() -> None:
         bsdf, n = loaded(name), 100_000
         si = interactions([0.6, 0, 0.8], n)
         asked = mi.BSDFContext(mi.TransportMode.Importance)
-        _, weight = bsdf.sample(asked, si, mi.Float(RNG.random(n)), mi.Point2f(RNG.random((2, n))))
+        _, weight = bsdf.sample(asked, si, mi.Float(aligned(RNG.random(n))), mi.Point2f(RNG.random((2, n))))
         found = np.array(bsdf.eval_diffuse_reflectance(interactions([0.6, 0, 0.8]))).ravel()
         np.testing.assert_allclose(found, np.array(weight).mean(axis=1), rtol=0.01, atol=2e-3)
 

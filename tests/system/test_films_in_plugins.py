@@ -13,6 +13,7 @@ import velatura as vt
 from velatura import kernel
 from velatura.model.solved import solve
 from velatura.optics.films import OpticalFilm, coherent
+from velatura.renderer.packets import aligned
 from velatura.stack import luminance_sensitivity, srgb_weights
 
 COATED = vt.Stack(
@@ -50,7 +51,7 @@ def lit(mi: Any, cosine: float, u: Any = 0.5) -> Any:
     si = dr.zeros(mi.SurfaceInteraction3f, np.size(u))
     si.wi = mi.Vector3f(float(np.sqrt(1 - cosine * cosine)), 0.0, cosine)
     dr.make_opaque(si.wi)  # one kernel for all angles
-    si.uv = mi.Point2f(mi.Float(np.atleast_1d(u).astype(np.float32)), 0.5)
+    si.uv = mi.Point2f(mi.Float(aligned(np.atleast_1d(u))), 0.5)
     return si
 
 
@@ -244,7 +245,7 @@ def test_texels_beside_films_have_gradients(mi: Any, key: str, offset: float, sc
     expected = (at(0.01) - at(-0.01)) / 0.02
     step = mi.Float(0.0)
     dr.enable_grad(step)
-    parameters[name] = mi.TensorXf(mi.Float(texels.ravel()) + step, texels.shape)
+    parameters[name] = mi.TensorXf(mi.Float(aligned(texels.ravel())) + step, texels.shape)
     parameters.update()
     found = value(mi, bsdf)
     dr.forward(step)
@@ -290,8 +291,9 @@ def drawn(mi: Any, bsdf: Any, cosine: float, count: int = 60_000) -> np.ndarray:
     rng = mi.PCG32(count)
     u = rng.next_float32(), mi.Point2f(rng.next_float32(), rng.next_float32())
     context = mi.BSDFContext(mi.TransportMode.Importance)
-    bs, weight = bsdf.sample(context, at_wavelengths(mi, cosine, count=count), *u)
-    reflected = bs.wo.z * cosine > 0
+    si = at_wavelengths(mi, cosine, count=count)
+    bs, weight = bsdf.sample(context, si, *u)
+    reflected = bs.wo.z * si.wi.z > 0
     both = (dr.select(reflected, weight, 0), dr.select(reflected, 0, weight))
     return np.array([np.mean(np.array(x), axis=1) for x in both])
 

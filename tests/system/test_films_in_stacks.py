@@ -380,7 +380,7 @@ def sampled(mi: Any, bsdf: Any, cosine: float) -> np.ndarray:
     rng = mi.PCG32(count)
     u = rng.next_float32(), mi.Point2f(rng.next_float32(), rng.next_float32())
     bs, weight = bsdf.sample(mi.BSDFContext(), si, *u)
-    return np.array(dr.mean(dr.select(bs.wo.z * cosine > 0, weight, 0), axis=1)).ravel()
+    return np.array(dr.mean(dr.select(bs.wo.z * si.wi.z > 0, weight, 0), axis=1)).ravel()
 
 
 def test_an_index_that_changes_changes_the_films(mi: Any) -> None:

@@ -15,6 +15,7 @@ from velatura.model import named
 from velatura.model.context import Context
 from velatura.model.solved import solve
 from velatura.model.variance import variance_kind
+from velatura.renderer.packets import aligned
 from velatura.stack import Material
 
 mi = kernel.mitsuba("llvm_ad_rgb")
@@ -105,8 +106,9 @@ def test_eval_pdf_and_sample_agree(name: str) -> None:
     phi = rng.uniform(0, 2 * np.pi, n)
     si = dr.zeros(mi.SurfaceInteraction3f, n)
     sin_theta = np.sqrt(1 - cos_theta**2)
-    si.wi = mi.Vector3f(sin_theta * np.cos(phi), sin_theta * np.sin(phi), cos_theta)
-    bs, weight = bsdf.sample(ctx, si, mi.Float(rng.random(n)), mi.Point2f(rng.random((2, n))))
+    wi = sin_theta * np.cos(phi), sin_theta * np.sin(phi), cos_theta
+    si.wi = mi.Vector3f(*(mi.Float(aligned(x)) for x in wi))
+    bs, weight = bsdf.sample(ctx, si, mi.Float(aligned(rng.random(n))), mi.Point2f(rng.random((2, n))))
     value, pdf = bsdf.eval_pdf(ctx, si, bs.wo)
     assert np.allclose(pdf, bs.pdf, rtol=1e-4)
     assert np.allclose(bsdf.eval(ctx, si, bs.wo), value, rtol=1e-5)
@@ -195,7 +197,7 @@ def test_white_paint_under_a_smooth_coat_loses_nothing() -> None:
     rng = np.random.default_rng(5)
     si = dr.zeros(mi.SurfaceInteraction3f, n)
     si.wi = interaction(direction(0.6, 0.3)).wi
-    _, weight = bsdf.sample(mi.BSDFContext(), si, mi.Float(rng.random(n)), mi.Point2f(rng.random((2, n))))
+    _, weight = bsdf.sample(mi.BSDFContext(), si, mi.Float(aligned(rng.random(n))), mi.Point2f(rng.random((2, n))))
     assert abs(np.mean(np.array(weight)) - 1) < 5e-3
 
 

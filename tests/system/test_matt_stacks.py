@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 import velatura as vt
 from velatura import kernel
+from velatura.renderer.packets import aligned
 
 mi = kernel.mitsuba("llvm_ad_rgb")
 import drjit as dr  # noqa: E402
@@ -38,7 +39,8 @@ def reflected(bsdf: Any, cos_theta: float) -> NDArray[np.float64]:
     sine = np.sqrt(1 - cosine * cosine)
     si = dr.zeros(mi.SurfaceInteraction3f, len(phi))
     si.wi = mi.Vector3f(math.sqrt(1 - cos_theta * cos_theta), 0.0, cos_theta)
-    wo = mi.Vector3f(*(mi.Float(x.astype(np.float32)) for x in (sine * np.cos(phi), sine * np.sin(phi), cosine)))
+    dr.make_opaque(si.wi)  # one kernel for all angles
+    wo = mi.Vector3f(*(mi.Float(aligned(x)) for x in (sine * np.cos(phi), sine * np.sin(phi), cosine)))
     value = np.array(bsdf.eval(mi.BSDFContext(), si, wo))
     return np.asarray(np.pi * (value / cosine).mean(axis=1))
 

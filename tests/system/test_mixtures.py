@@ -10,6 +10,7 @@ import pytest
 
 import velatura as vt
 from velatura import kernel
+from velatura.renderer.packets import aligned
 from velatura.stack import dumps
 
 mi = kernel.mitsuba("llvm_ad_rgb")
@@ -27,13 +28,14 @@ COUNT = 200
 
 def interactions(count: int = COUNT, lowest: float = 0.05) -> Any:
     si = dr.zeros(mi.SurfaceInteraction3f, count)
-    si.wi, si.uv = directions(count, lowest), mi.Point2f(RNG.random(count), RNG.random(count))
+    si.wi, si.uv = directions(count, lowest), mi.Point2f(*(mi.Float(aligned(RNG.random(count))) for _ in "uv"))
     return si
 
 
 def directions(count: int = COUNT, lowest: float = 0.05) -> Any:
     z, phi = RNG.uniform(lowest, 1, count), RNG.uniform(0, 2 * np.pi, count)
-    return mi.Vector3f(np.sqrt(1 - z * z) * np.cos(phi), np.sqrt(1 - z * z) * np.sin(phi), z)
+    sine = np.sqrt(1 - z * z)
+    return mi.Vector3f(*(mi.Float(aligned(x)) for x in (sine * np.cos(phi), sine * np.sin(phi), z)))
 
 
 def context(component: int | None = None) -> Any:
@@ -56,7 +58,7 @@ def test_a_mixture_of_equal_stacks_is_that_stack(plugin: str, stack: vt.Stack) -
     for a, b in zip(found(mixed, si, wo), found(alone, si, wo)):
         assert np.allclose(a, b, rtol=1e-6, atol=1e-6)
     u = RNG.random((3, COUNT))
-    bs, weight = mixed.sample(context(), si, mi.Float(u[0]), mi.Point2f(u[1:]))
+    bs, weight = mixed.sample(context(), si, mi.Float(aligned(u[0])), mi.Point2f(u[1:]))
     value, pdf = found(alone, si, bs.wo)
     assert np.allclose(bs.pdf, pdf, rtol=1e-4, atol=1e-6)
     assert np.allclose(np.array(weight * bs.pdf), value, rtol=1e-4, atol=1e-6)
@@ -92,7 +94,7 @@ def test_components_are_those_of_all_parts() -> None:
             total, k = total + value, k + 1
     assert np.allclose(total, found(mixed, si, wo)[0], rtol=1e-5, atol=1e-6)
     u = RNG.random((3, COUNT))
-    bs, _ = mixed.sample(context(), si, mi.Float(u[0]), mi.Point2f(u[1:]))
+    bs, _ = mixed.sample(context(), si, mi.Float(aligned(u[0])), mi.Point2f(u[1:]))
     shares, part_of = [share for share, _ in parts], np.repeat(range(len(parts)), counts)
     chosen = np.searchsorted(np.cumsum(shares)[:-1], u[0], side="right")
     assert np.array_equal(part_of[np.array(bs.sampled_component)], chosen)
@@ -239,7 +241,7 @@ def test_a_smooth_part_beside_a_rough_one_has_samples_and_no_value() -> None:
     for got, alone in zip(found(mixed, si, wo), found(rough, si, wo)):
         assert np.allclose(got, 0.75 * alone, rtol=1e-5, atol=1e-7)
     u = RNG.random((3, COUNT))
-    bs, weight = mixed.sample(context(), si, mi.Float(u[0]), mi.Point2f(u[1:]))
+    bs, weight = mixed.sample(context(), si, mi.Float(aligned(u[0])), mi.Point2f(u[1:]))
     delta = u[0] < 0.25
     assert np.array_equal(np.array(mi.has_flag(bs.sampled_type, mi.BSDFFlags.Delta)), delta)
     assert np.allclose(np.array(bs.wo)[:2, delta], -np.array(si.wi)[:2, delta], atol=1e-6)
@@ -248,7 +250,7 @@ def test_a_smooth_part_beside_a_rough_one_has_samples_and_no_value() -> None:
     many = interactions(1)
     si = dr.gather(mi.SurfaceInteraction3f, many, dr.zeros(mi.UInt32, 200_000))
     u = RNG.random((3, 200_000))
-    _, weight = mixed.sample(context(), si, mi.Float(u[0]), mi.Point2f(u[1:]))
+    _, weight = mixed.sample(context(), si, mi.Float(aligned(u[0])), mi.Point2f(u[1:]))
     expected = 0.25 + 0.75 * np.array(rough.eval_diffuse_reflectance(many)).ravel()
     assert np.allclose(np.array(weight).mean(axis=1), expected, rtol=0.02)
 
@@ -301,7 +303,7 @@ def test_walks_through_a_mixture_agree_with_its_lobes_and_with_the_plugin() -> N
     walks = vt.bsdf(mix, "reference", microsurface=True)
     many = dr.gather(mi.SurfaceInteraction3f, si, dr.zeros(mi.UInt32, 2**18))
     u = RNG.random((3, 2**18))
-    _, weight = walks.sample(context(), many, mi.Float(u[0]), mi.Point2f(u[1:]))
+    _, weight = walks.sample(context(), many, mi.Float(aligned(u[0])), mi.Point2f(u[1:]))
     assert np.allclose(np.array(weight).mean(axis=1), found.truth.albedo[:, 0], atol=0.006)
 
 

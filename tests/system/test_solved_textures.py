@@ -10,6 +10,7 @@ import pytest
 
 import velatura as vt
 from velatura import kernel
+from velatura.renderer.packets import aligned
 
 mi = kernel.mitsuba("llvm_ad_rgb")
 import drjit as dr  # noqa: E402
@@ -64,7 +65,7 @@ def light(bsdf: Any, cosine: float) -> np.ndarray:
     si.uv, si.wi = mi.Point2f(U, 0.5), mi.Vector3f(0.8 * sine, 0.6 * sine, cosine)
     dr.make_opaque(si.wi)  # one kernel for all angles
     for side in (z, -z):
-        wo = mi.Vector3f(x.ravel(), y.ravel(), side.ravel())
+        wo = mi.Vector3f(*(mi.Float(aligned(each.ravel())) for each in (x, y, side)))
         value = np.array(bsdf.eval(mi.BSDFContext(), si, wo)) / z.ravel()
         found.append(np.where((x * x + y * y).ravel() < 1, value, 0) * (2 / NODES) ** 2)
     return np.concatenate(found, axis=1)

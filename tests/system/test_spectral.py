@@ -15,6 +15,7 @@ from velatura.binding import STEERING_NM
 from velatura.errors import InvalidInput
 from velatura.model.context import Context
 from velatura.model.solved import solve
+from velatura.renderer.packets import aligned
 from velatura.stack import spectra
 
 mi = kernel.mitsuba("llvm_ad_rgb")
@@ -109,7 +110,7 @@ def test_eval_pdf_and_sample_agree(name: str) -> None:
     bsdf, ctx, n = vt.bsdf(MATERIALS[name]), mi.BSDFContext(), 5000
     rng = np.random.default_rng(3)
     si = seen(WI, RAYS[0], n)
-    bs, weight = bsdf.sample(ctx, si, mi.Float(rng.random(n)), mi.Point2f(rng.random((2, n))))
+    bs, weight = bsdf.sample(ctx, si, mi.Float(aligned(rng.random(n))), mi.Point2f(rng.random((2, n))))
     value, pdf = bsdf.eval_pdf(ctx, si, bs.wo)
     assert np.allclose(pdf, bs.pdf, rtol=1e-4)
     assert np.allclose(bsdf.eval(ctx, si, bs.wo), value, rtol=1e-5)
@@ -121,7 +122,7 @@ def test_shapes_do_not_depend_on_the_wavelengths_of_a_ray(name: str) -> None:
     """Expected: the same densities and the same samples, to the last bit, and values that differ."""
     bsdf, ctx, n = vt.bsdf(MATERIALS[name]), mi.BSDFContext(), 1000
     u = np.random.default_rng(7).random((3, n))
-    one, other = (bsdf.sample(ctx, seen(WI, ray, n), mi.Float(u[0]), mi.Point2f(u[1:])) for ray in RAYS)
+    one, other = (bsdf.sample(ctx, seen(WI, ray, n), mi.Float(aligned(u[0])), mi.Point2f(u[1:])) for ray in RAYS)
     assert np.array_equal(one[0].wo, other[0].wo) and np.array_equal(one[0].pdf, other[0].pdf)
     assert not np.allclose(one[1], other[1], rtol=1e-3)
 
@@ -223,7 +224,7 @@ def test_what_is_sampled_once_is_what_every_ray_would_find(name: str) -> None:
     cosine, phi = rng.uniform(0.1, 1, n), rng.uniform(0, 2 * np.pi, n)
     sine = np.sqrt(1 - cosine**2)
     si = seen((sine * np.cos(phi), sine * np.sin(phi), cosine), [rng.uniform(380, 750, n) for _ in range(4)], n)
-    bs, _ = bsdf.sample(ctx, si, mi.Float(rng.random(n)), mi.Point2f(rng.random((2, n))))
+    bs, _ = bsdf.sample(ctx, si, mi.Float(aligned(rng.random(n))), mi.Point2f(rng.random((2, n))))
     found = np.array(bsdf.eval(ctx, si, bs.wo))
     bsdf.stacks[0].bodies = replace(bsdf.stacks[0].bodies, at=bsdf.stacks[0].bodies.lobed)
     expected = np.array(bsdf.eval(ctx, si, bs.wo))
@@ -270,7 +271,7 @@ def test_a_furnace_stays_white() -> None:
     rng = np.random.default_rng(1)
     for ray in RAYS:
         si = seen((0.3, 0.0, 0.95), ray, n)
-        _, weight = bsdf.sample(mi.BSDFContext(), si, mi.Float(rng.random(n)), mi.Point2f(rng.random((2, n))))
+        _, weight = bsdf.sample(mi.BSDFContext(), si, mi.Float(aligned(rng.random(n))), mi.Point2f(rng.random((2, n))))
         albedo = np.array(weight).mean(axis=1)
         assert np.ptp(albedo) < 2e-3
         assert np.allclose(albedo, 1, atol=0.02)
@@ -299,7 +300,9 @@ def test_rays_add_no_noise() -> None:
     stack = vt.Stack([vt.Interface(eta="sf11", alpha=0.05), vt.Interface(conductor="Al", alpha=0.3)])
 
     def spread(wavelengths) -> float:
-        _, weight = vt.bsdf(stack).sample(mi.BSDFContext(), seen(WI, wavelengths, n), mi.Float(u[0]), mi.Point2f(u[1:]))
+        _, weight = vt.bsdf(stack).sample(
+            mi.BSDFContext(), seen(WI, wavelengths, n), mi.Float(aligned(u[0])), mi.Point2f(u[1:])
+        )
         return float(np.array(weight)[0].std() / np.array(weight)[0].mean())
 
     found = spread(ray)

@@ -9,6 +9,7 @@ import pytest
 
 import velatura as vt
 from velatura import kernel
+from velatura.renderer.packets import aligned
 
 mi = kernel.mitsuba("llvm_ad_rgb")
 import drjit as dr  # noqa: E402
@@ -34,7 +35,7 @@ def sampled(bsdf: Any, cos_theta: float, count: int = 2**17, seed: int = 0) -> t
     """Directions (n, 3) and energies (n,) in green; radiance times squared index is energy."""
     u = np.random.default_rng(seed).random((3, count))
     si = interaction(cos_theta, count)
-    bs, weight = bsdf.sample(mi.BSDFContext(), si, mi.Float(u[0]), mi.Point2f(u[1:]))
+    bs, weight = bsdf.sample(mi.BSDFContext(), si, mi.Float(aligned(u[0])), mi.Point2f(u[1:]))
     return np.array(bs.wo).T, np.array(weight[1] * bs.eta * bs.eta)
 
 
