@@ -17,6 +17,7 @@ from velatura.model.rough_interface import KEPT
 from velatura.model.solved.energies.energies import energies
 from velatura.model.solved.lobes.widths import nearly_straight
 from velatura.renderer import compiled
+from velatura.renderer.packets import aligned
 from velatura.stack import Material
 
 mi = kernel.mitsuba("llvm_ad_rgb")
@@ -86,7 +87,8 @@ def albedo(stack: vt.Stack, cos_theta: float, form: str, side: int = 1, n: int =
     drawn, _ = bsdf.sample(context, si, v_1, mi.Point2f(v_2, u), True)
     spread = mi.warp.square_to_cosine_hemisphere(mi.Point2f(u_1, u_2))
     spread.z *= side
-    wo = mi.Vector3f(*(np.where(np.array(v) < 0.5, np.array(a), np.array(b)) for a, b in zip(drawn.wo, spread)))
+    mixed = (np.where(np.array(v) < 0.5, np.array(a), np.array(b)) for a, b in zip(drawn.wo, spread))
+    wo = mi.Vector3f(*(mi.Float(aligned(x)) for x in mixed))
     value, pdf = (np.array(x) for x in bsdf.eval_pdf(context, si, wo))
     density = 0.5 * pdf + 0.5 * np.maximum(side * np.array(wo.z), 0) / np.pi
     return np.asarray((value / np.maximum(density, 1e-12)).mean(axis=1))

@@ -156,7 +156,7 @@ def test_gradients_of_transmission_are_finite_differences(form: str) -> None:
         kind, value = type(parameters[key]), np.array(parameters[key])
         around = []
         for step in (-2e-3, 2e-3, 0.0):
-            parameters[key] = kind(value + np.float32(step))
+            parameters[key] = kind((value + np.float32(step)).tolist())
             around.append(float(brightness()[0]))
         slopes[key] = (around[1] - around[0]) / 4e-3
     for key in keys:
