@@ -18,10 +18,11 @@ from velatura.stack import Address
 Array = NDArray[np.floating]
 
 MOST = 4  # values of a stack that are tried
-SAMPLES = 1 << 17  # gradients grow as a root about critical angles, so that few say little of their mean
+SAMPLES = 1 << 16
 SMOOTH = 0.01  # roughness of stacks that are not tried
 OFF = 0.1  # of a difference, by which a gradient may be off
 CLOSE, STAYS = 0.01, 0.25  # share of a step, and of the light that changes over the whole one, where light jumps
+ERRORS = 3  # standard ones, by which a mean over samples may be off
 UNEVEN = 2e-3  # of the light, by which values of either end may be off
 
 
@@ -62,16 +63,30 @@ def _found(stack: vt.Stack, rng: np.random.Generator) -> list[tuple[str, str]]:
     share = dr.select(drawn.pdf > 0, (1 + drawn.wo.x) / (SAMPLES * dr.maximum(drawn.pdf, 1e-6)), 0)
     dr.eval(si.wi, drawn.wo, share)
 
+    def lights(bsdf: Any) -> Any:
+        return dr.mean(bsdf.eval(context, si, drawn.wo)) * share
+
     def light(bsdf: Any) -> Any:
-        return dr.sum(dr.mean(bsdf.eval(context, si, drawn.wo)) * share)
+        return dr.sum(lights(bsdf))
 
     whole = float(light(bsdf)[0])
     found: list[tuple[str, str]] = []
     for at in chosen:
-        x, scale = given[at], mi.Float(1)
-        dr.enable_grad(scale)
-        parameters[at.name] = (mi.Color3f if len(x) > 1 else mi.Float)(x.tolist()) * scale
-        parameters.update()
+        x = given[at]
+
+        def variable(at: Address = at, x: Array = x) -> Any:
+            scale = mi.Float(1)
+            dr.enable_grad(scale)
+            parameters[at.name] = (mi.Color3f if len(x) > 1 else mi.Float)(x.tolist()) * scale
+            parameters.update()
+            return scale
+
+        def noise(variable: Callable[[], Any] = variable) -> float:
+            scale, each = variable(), lights(bsdf)
+            dr.forward(scale, flags=dr.ADFlag.Default | dr.ADFlag.AllowNoGrad)
+            return float(np.std(np.array(dr.grad(each))) * np.sqrt(SAMPLES))
+
+        scale = variable()
         dr.backward(light(bsdf), flags=dr.ADFlag.Default | dr.ADFlag.AllowNoGrad)
         gradient = float(dr.grad(scale)[0])
 
@@ -82,18 +97,25 @@ def _found(stack: vt.Stack, rng: np.random.Generator) -> list[tuple[str, str]]:
 
         step = max(RELATIVES.get(at.role, RELATIVE), STEPS.get(at.role, 0) / float(np.abs(x).max()))
         low, high = at.declared.within
-        found += judged(at, gradient, scaled, (max(1 - step, low / x.max()), min(1 + step, high / x.max())), whole)
+        ends = max(1 - step, low / x.max()), min(1 + step, high / x.max())
+        found += judged(at, gradient, scaled, ends, whole, noise)
         scaled(1)
     return found
 
 
 def judged(
-    at: Address, gradient: float, light: Callable[[float], float], ends: tuple[float, float], whole: float
+    at: Address,
+    gradient: float,
+    light: Callable[[float], float],
+    ends: tuple[float, float],
+    whole: float,
+    noise: Callable[[], float] = lambda: 0.0,
 ) -> Iterator[tuple[str, str]]:
     """Faults of a gradient by the scale of a value, and of the light between two scales.
 
     Where it is no difference, light may be curved or have a kink: a gradient is between the slopes of both sides, over
-    the step and half of it. Or light jumps, which is an error of its own: of a change a share stays over a small step.
+    the step and half of it, but for its `noise`: about critical angles it grows as a root. Or light jumps, which is an
+    error of its own: of a change a share stays over a small step.
     """
     low, high = map(light, ends)
     over = ends[1] - ends[0]
@@ -114,6 +136,6 @@ def judged(
             return
         slopes += [(far - whole) / (end - 1), (light(1 + half) - whole) / half]
     least, most = over * min(slopes), over * max(slopes)
-    margin = OFF * max(abs(least), abs(most)) + UNEVEN * whole
+    margin = OFF * max(abs(least), abs(most)) + UNEVEN * whole + ERRORS * over * noise()
     if not least - margin <= over * gradient <= most + margin:
         yield f"gradient of {at.key} is no difference", f"{detail}; slopes of both sides {least:.4g} to {most:.4g}"

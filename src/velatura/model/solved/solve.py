@@ -24,7 +24,7 @@ from velatura.model.solved.energies.adding import Part, interfaces, parts
 from velatura.model.solved.energies.energies import INCIDENCES, MODES, SAMPLES, Energies, energies, media_of
 from velatura.model.solved.energies.media import Slab, escaped
 from velatura.model.solved.energies.modes import Relative
-from velatura.model.solved.energies.nodes import Nodes
+from velatura.model.solved.energies.nodes import CLOSE, Nodes
 from velatura.model.solved.grid import Folded, Grid, Listed
 from velatura.model.solved.guards import ALBEDO_MIN, COS_ON_GRID_MIN, ENERGY_EPS, WIDTH_ALPHA_MAX
 from velatura.model.solved.lobes import refracted_lobe, remainder, top_medium, wide, widths
@@ -68,12 +68,15 @@ MIN_DEFENSIVE_SHARE = 0.2  # of samples of the symmetric form, that the remainde
 @dataclass(frozen=True)
 class LobeSpec:
     """A lobe: the number of its interface from the top, that of the one that shapes its light on the way out, None
-    where none does, whether it is the veil of one, and whether its medium is nowhere of a lower index than outside."""
+    where none does, whether it is the veil of one, whether its medium is nowhere of a lower index than outside, and
+    whether its light has an edge for want of that: where what lets it out passes light of any momentum in the medium.
+    """
 
     interface: int
     first: int | None
     veil: bool
     denser: bool
+    edged: bool
 
 
 @dataclass(frozen=True)
@@ -695,7 +698,9 @@ def layout_of(materials: Sequence[Material], veiled: Set[int] = frozenset()) -> 
     rough = widths.stepped(turns, widths.LEAST_TURN)
     above = np.array([[np.mean(facets.above) / np.mean(found[0].above) for facets in found] for found in each])
     denser = np.all(above >= 1, axis=0).tolist()
-    lobes = [LobeSpec(k, widths.first_step(steps[:k]), veil, denser[k]) for k, veil in both]
+    firsts = [widths.first_step(steps[:k]) for k in range(len(steps))]
+    edged = [k is not None and bool(np.any(above[:, k + 1] > own * CLOSE)) for k, own in zip(firsts, above.T)]
+    lobes = [LobeSpec(k, firsts[k], veil, denser[k], edged[k] and not denser[k]) for k, veil in both]
     cloudy = sorted(set().union(*map(_cloudy, materials)))
     stepped = widths.stepped(steps)
     last, top = rough[-1] if rough else None, _top(materials, stepped)
@@ -858,6 +863,6 @@ def shapes_of(found: Sequence[SmoothInterface], drawn: Sequence[LobeSpec]) -> li
         own, k = found[lobe.interface], lobe.first
         facets = own if k is None or not own.opaque else None
         out = (indices[0], None) if k is None else (indices[k], found[k])
-        n = replace(indices[lobe.interface], denser=lobe.denser)
+        n = replace(indices[lobe.interface], denser=lobe.denser, edged=lobe.edged)
         shapes.append(Shape(lobe.interface, n, facets, *out))
     return shapes

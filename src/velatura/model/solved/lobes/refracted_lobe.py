@@ -43,13 +43,14 @@ Reflectance = Callable[[Value], Value]
 class MediumIndex:
     """An index n relative to the medium outside, and what lobes take of it: its inverse, and the radius of the ring of
     momenta beyond those that can leave, from 1 to n, in squares and as it is. `denser`: whether n is known to be 1 at
-    least, so that light from any direction gets in."""
+    least, so that light from any direction gets in. `edged`: whether light of momenta beyond n is cut off."""
 
     n: Value
     inverse: Value
     ring2: Value
     ring: Value
     denser: bool = False
+    edged: bool = False
 
     @classmethod
     def of(cls, n: Value, denser: bool = False) -> MediumIndex:
@@ -64,7 +65,7 @@ class MediumIndex:
         n, inverse, ring2, ring = (
             ops.select(where, getattr(a, x), getattr(b, x)) for x in ("n", "inverse", "ring2", "ring")
         )
-        return MediumIndex(n, inverse, ring2, ring, a.denser and b.denser)
+        return MediumIndex(n, inverse, ring2, ring, a.denser and b.denser, a.edged or b.edged)
 
     @property
     def is_outside(self) -> bool:
@@ -92,10 +93,10 @@ class RefractedLobe(ops.NamedFields):
 def eval_pdf(lobe: RefractedLobe, wi: Direction, wo: Direction) -> tuple[Value, Value]:
     """f(wi, wo) |cos theta_o|, a colour, and the density of `sample`; both 0 unless wi and wo are above the surface."""
     n = MediumIndex.of(lobe.n)
-    ends = None if n.is_outside or n.denser else ops.around(n.n, RELATIVE)
+    ends = ops.around(n.n, RELATIVE) if n.edged else None
     if ends is None:
         return _eval_pdf(lobe, wi, wo)
-    # Out of a rarer medium light has an edge, which moves with the index: slopes by it are differences
+    # The edge moves with the index: slopes by it are differences
     (below, _), (value, density), (above, _) = (
         _eval_pdf(replace(lobe, n=MediumIndex.of(each)), wi, wo) for each in ends
     )
