@@ -25,7 +25,6 @@ STEPS = {
     "film_thickness_nm": 3.0,
 }  # least; rotations are in degrees
 STEP = 0.005
-INDICES = "eta", "exterior"  # roles of values that media are rarer or denser by
 ROUNDED = 1e-6  # share of an index that means of colours are off by
 
 
@@ -50,7 +49,7 @@ class Variables:
         low, high = address.declared.within
         step = max(RELATIVES.get(address.role, RELATIVE) * abs(x), STEPS.get(address.role, STEP))
         ends = max(x - step, low), min(x + step, high)
-        if address.role not in INDICES:
+        if address.role != "eta":
             return ends
         # Light has a kink where a medium gets rarer than the outside, and shapes have the slope of its denser side
         denser = _denser(self.start)
