@@ -544,43 +544,43 @@ def integrals(
         c.width * ops.power(np.abs(step) + ops.TINY, fitted.EXPONENT)
         for c, step in zip(transmission.refractions, i.steps)
     ]
-    u, v, rotation = (np.asarray(x)[..., None, None] for x in reduce(lambda a, b: a + b, widths).roughness(WIDTHS))
+    u, v, rotation = (np.broadcast_to(x, i.p2.shape) for x in reduce(lambda a, b: a + b, widths).roughness(WIDTHS))
     # Cast rays from the middle
     share, weight = low_discrepancy.gauss(nodes[0])
     # Both sides of the plane of incidence are alike where interfaces have no axes
     alike = all(isinstance(refraction.width, Isotropic) for refraction in transmission.refractions)
     phi = (np.arange(nodes[1]) + 0.5) * ((pi if alike else 2 * pi) / nodes[1])
-    rotation = np.arctan2(i.p[1], i.p[0])[:, None, None] if alike else rotation
+    rotation = np.arctan2(i.p[1], i.p[0]) if alike else rotation
     n_out = np.asarray(n[-1])
     length = np.sqrt(np.maximum(i.p2, ops.TINY))
     bound = np.where(length < n_out, np.minimum(1, (1 - MOMENTUM_WIDTH_MIN) * n_out / length), EDGE * n_out / length)
-    p = [(bound * x)[:, None, None] for x in i.p]
-    gap = ((1 - bound) * length)[:, None, None]
+    gap = (1 - bound) * length
     u, v = (np.sqrt(width**2 + gap**2 + MOMENTUM_WIDTH_MIN**2) for width in (u, v))
-    ray = u * np.cos(phi)[:, None], v * np.sin(phi)[:, None]
-    cosine, sine = np.cos(rotation), np.sin(rotation)
-    ray = cosine * ray[0] - sine * ray[1], sine * ray[0] + cosine * ray[1]
-    # Follow each to the rim of the disc, where the distribution r^2 / (1 + r^2) of widths has come to `most`
-    length2, along = ray[0] ** 2 + ray[1] ** 2, ray[0] * p[0] + ray[1] * p[1]
-    inside = n_out * n_out - p[0] ** 2 - p[1] ** 2
-    rim = (np.sqrt(along**2 + length2 * inside) - along) / length2
-    most = rim**2 / (1 + rim**2)
-    odds = share * most / (1 - share * most)
-    r = np.sqrt(odds)
-    area = weight * most * (pi / nodes[1]) * (1 + odds) ** 2 * u * v
-    x, y = (p[0] + r * ray[0]) / n_out, (p[1] + r * ray[1]) / n_out
-    z = np.sqrt(np.maximum(1 - x * x - y * y, 1e-12))
-    area = area / (n_out * n_out * z)
-    directions = [each.reshape(len(x), -1) for each in (x, y, -z, area)]
-    found, _, _ = compiled.over(_passed, wi, directions, wider(transmission))
+    middle = *(bound * x for x in i.p), u, v, np.cos(rotation), np.sin(rotation)
+    rays = np.tile(share, nodes[1]), np.tile(weight * (pi / nodes[1]), nodes[1])
+    around = np.repeat(np.cos(phi), nodes[0]), np.repeat(np.sin(phi), nodes[0])
+    found, _, _ = compiled.over(_passed, (*wi, *middle), (*rays, *around), wider(transmission))
     *energy, passes = found
     count = len(energy) // 2
     return np.array(energy[:count]), np.array(energy[count:]), passes
 
 
-def _passed(wi: Sequence[Value], directions: Sequence[Value], transmission: Transmission) -> Found:
-    x, y, z, area = directions
-    value, density = _eval_pdf(transmission, (wi[0], wi[1], wi[2]), (x, y, z), True)
+def _passed(sources: Sequence[Value], samples: Sequence[Value], transmission: Transmission) -> Found:
+    wi_x, wi_y, wi_z, p_x, p_y, u, v, cosine, sine = sources
+    share, weight, *around = samples
+    n = transmission.indices[-1]
+    along_u, along_v = u * around[0], v * around[1]
+    ray = cosine * along_u - sine * along_v, sine * along_u + cosine * along_v
+    # Follow each to the rim of the disc, where the distribution r^2 / (1 + r^2) of widths has come to `most`
+    length2, along = ray[0] * ray[0] + ray[1] * ray[1], ray[0] * p_x + ray[1] * p_y
+    rim = (ops.sqrt(along * along + length2 * (n * n - p_x * p_x - p_y * p_y)) - along) / length2
+    most = rim * rim / (1 + rim * rim)
+    odds = share * most / (1 - share * most)
+    r = ops.sqrt(odds)
+    x, y = (p_x + r * ray[0]) / n, (p_y + r * ray[1]) / n
+    z = ops.sqrt(ops.maximum(1 - x * x - y * y, 1e-12))
+    area = weight * most * ((1 + odds) * (1 + odds) * u * v / (n * n * z))
+    value, density = _eval_pdf(transmission, (wi_x, wi_y, wi_z), (x, y, -1 * z), True)
     return Found([value * area, value * area * ops.divide(value, density), density * area])
 
 
