@@ -43,11 +43,15 @@ Corners = Callable[[Sequence[int], Sequence[Value], Split], list[tuple[Value, Va
 class Gridded(Protocol):
     """Input of `interpolate`: values at the nodes i/(N-1) of a grid of some shape.
 
-    Dr.Jit reads packets, of a module; NumPy reads `data`, with channels on the last axis.
+    Dr.Jit reads packets, of a module; NumPy reads `data`, with channels on the last axis. They begin at the node of a
+    number.
     """
 
     @property
     def shape(self) -> tuple[int, ...]: ...
+
+    @property
+    def first(self) -> Value: ...
 
     def packets(self, dialect: Any) -> Any: ...
 
@@ -136,7 +140,8 @@ class _Numpy(Unrolled):
 
         channels = table.data.shape[-1]
         flat = table.data.reshape(-1, channels)
-        total = sum(np.asarray(w)[..., None] * flat[i] for i, w in corners(table.data.shape, coordinates, split))
+        around = corners(table.shape, coordinates, split)
+        total = sum(np.asarray(w)[..., None] * flat[i + table.first] for i, w in around)
         return [total[..., c] for c in range(channels)]
 
 
@@ -223,7 +228,9 @@ class _DrJit(Unrolled):
             return cell, position - number(cell)
 
         around, found = corners(table.shape, [number(x) for x in coordinates], split), []
-        packets = table.packets(dialect)
+        packets, first = table.packets(dialect), table.first
+        if not isinstance(first, int) or first:
+            around = [(node + dialect.UInt32(first), weight) for node, weight in around]
         for begin, width in packets.parts:
             kind, shape = (number, None) if width == 1 else (dialect.ArrayXf, (width, 1))
             total: Value = 0.0

@@ -5,8 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from velatura import kernel
 from velatura.renderer import directional_grid
-from velatura.renderer.directional_grid import Packing, Summed
+from velatura.renderer.directional_grid import Packed, Packing, Summed
 
 RNG = np.random.default_rng(0)
 SHAPE = (7,)
@@ -40,3 +41,22 @@ def test_functions_that_are_sums_of_few() -> None:
     w = directional_grid.direction(RNG.uniform(size=50), np.zeros(50))
     expected = directional_grid.curves(list(shares.T @ few), SHAPE, None)(w)
     np.testing.assert_allclose(Summed(packed, shares.tolist()).at(np.sqrt(w[2])), expected, rtol=1e-12)
+
+
+@pytest.mark.parametrize("shape", [(7,), (7, 5)])
+@pytest.mark.parametrize("renderer", [False, True])
+def test_functions_of_either_side_are_those_of_one(shape: tuple[int, ...], renderer: bool) -> None:
+    """Two grids of one table: where a condition holds the first one is read, else the second."""
+    rows = RNG.uniform(size=(2, 3, np.prod(shape))).astype(np.float32)
+    number = None
+    x, y, z = directional_grid.direction(RNG.uniform(size=50), RNG.uniform(size=50))
+    w, where = (x, y, z), RNG.random(50) < 0.5
+    first, second = (directional_grid.curves(list(side), shape, None)(w) for side in rows)
+    if renderer:
+        mi = kernel.mitsuba("llvm_ad_rgb")
+        number, w, where = mi.Float, tuple(map(mi.Float, w)), mi.Mask(where)
+    flat = np.concatenate([side.T.ravel() for side in rows])
+    table = directional_grid.interleaved(flat, (2 * shape[0], *shape[1:]), number)
+    above, below = (Packed((grid,), (0, 1, 2)) for grid in table.grids(shape))
+    found = np.array(above.either(below, where)(w))
+    np.testing.assert_allclose(found, np.where(np.array(where), first, second), atol=1e-5)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import functools
 import sys
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from math import pi, prod
 from typing import Any
 
@@ -26,10 +26,16 @@ PLANE = (64, 33)  # nodes over the cosine and the azimuth; the latter one more t
 
 @dataclass(frozen=True, eq=False)
 class Curves:
-    """Values at the nodes: packets of Dr.Jit, or an array of NumPy, with channels on the last axis."""
+    """Values at the nodes: packets of Dr.Jit, or an array of NumPy, with channels on the last axis. They may hold other
+    grids besides; this one begins at the node of a number."""
 
     data: Any
     shape: tuple[int, ...]
+    first: Value = 0
+
+    def grids(self, shape: tuple[int, ...]) -> list[Curves]:
+        """Each of the grids of a shape that a table has one after the other."""
+        return [Curves(self.data, shape, begin) for begin in range(0, prod(self.shape), prod(shape))]
 
     def packets(self, dialect: Any) -> Packets:
         found: Packets = self.data
@@ -85,6 +91,11 @@ class Packed:
     def __call__(self, w: Direction, *others: Value) -> list[Value]:
         """Values, like those of `Curves`."""
         return self._placed(table(w, *others) for table in self.tables)
+
+    def either(self, other: Packed, where: Value) -> Packed:
+        """These functions where a condition holds, else others that lie in the same tables."""
+        firsts = (ops.select(where, a.first, b.first) for a, b in zip(self.tables, other.tables))
+        return replace(self, tables=tuple(replace(a, first=first) for a, first in zip(self.tables, firsts)))
 
     def at(self, *coordinates: Value) -> list[Value]:
         """Values for coordinates from 0 to 1 on all axes, those of directions included."""

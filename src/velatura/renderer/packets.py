@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass
 from threading import Lock
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 
@@ -34,6 +34,7 @@ class SampledGrid:
     """Values at the nodes of a grid, `data` with channels on the last axis; a Dr.Jit module gets them at first use."""
 
     data: np.ndarray
+    first: ClassVar[int] = 0
     _packets: dict[Any, Packets]
 
     @property

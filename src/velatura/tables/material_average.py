@@ -5,7 +5,7 @@ from __future__ import annotations
 import sys
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 
@@ -29,6 +29,7 @@ class Sheet:
     theta_c: Value | None
     colour: type | None
     held: Packets
+    first: ClassVar[int] = 0
 
     def packets(self, dialect: Any) -> Packets:
         return self.held

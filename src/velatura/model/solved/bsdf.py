@@ -33,6 +33,7 @@ from velatura.model.variance import PerAxis, Roughness, Variance
 from velatura.ops import Value
 from velatura.optics import ggx
 from velatura.optics.ggx import Direction
+from velatura.renderer.directional_grid import Packed
 
 MAX_SAMPLE_WEIGHT = 2.9  # weight of a sample
 
@@ -103,6 +104,13 @@ class Side:
         """The columns for a direction above, as they are declared."""
         found = self.declaration.read(self._values(self.declaration.columns, self.curves(w)))
         return replace(found, chance=ops.maximum(found.chance, 0.0))
+
+    def either(self, other: Side, where: Value, w: Direction) -> Columns:
+        """The columns of this side where a condition holds, else of another one, for a direction above."""
+        if isinstance(self.curves, Packed) and isinstance(other.curves, Packed):
+            return replace(self, curves=self.curves.either(other.curves, where)).at(w)
+        columns: Columns = ops.select_record(where, self.at(w), other.at(w))
+        return columns
 
     def narrowed(self, columns: Columns) -> Columns:
         """Columns where what is wide is no more that of lobes."""
@@ -302,7 +310,7 @@ class Solved:
             return self.above.seen(wi), 1.0
         turned = upright(wi, wi)
         where = wi[2] > 0
-        columns = ops.select_record(where, self.above.at(turned), self.below.at(turned))
+        columns = self.above.either(self.below, where, turned)
         side = replace(
             self.above,
             shapes=tuple(_either(where, a, b) for a, b in zip(self.above.shapes, self.below.shapes)),

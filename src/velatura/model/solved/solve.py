@@ -627,19 +627,19 @@ def solve(material: Material, model: Model, variance: type[Variance], context: C
         # After the values come their differences
         found = replace(solver, finely=bool(packings)).solve(given.replaced(start, numbers), layouts)
         if not packings:
-            packings.extend(
-                Packing.of(side.rows, side.declaration.groups(solver.colours), shared=not given.given) for side in found
-            )
-        flat = []
-        for side, packing in zip(found, packings):
-            flat += [x.T.ravel() for x in packing.split(solver.spread(side))]
-            flat.append(side.numbers)
-        return flat
+            # Both sides lie in the same tables, so that either is one fetch
+            groups = found[0].declaration.groups(solver.colours)
+            rows = np.concatenate([side.rows for side in found], axis=1)
+            packings.append(Packing.of(rows, groups, shared=not given.given))
+        spread = np.concatenate([solver.spread(side) for side in found], axis=1)
+        return [*(x.T.ravel() for x in packings[0].split(spread)), *(side.numbers for side in found)]
 
     flat, made = iter(finite_differences.differentiable(arrays, given.given, given.around, context.number)), []
-    for seen, layout, packing in zip(sides(material), layouts, packings):
-        tables = [directional_grid.interleaved(next(flat), solver.shape, context.number) for _ in packing.tables]
-        curves, column = packing.curves(tables), next(flat)
+    (packing,), nodes = packings, (len(layouts) * solver.shape[0], *solver.shape[1:])
+    tables = [directional_grid.interleaved(next(flat), nodes, context.number) for _ in packing.tables]
+    of_sides = zip(*(table.grids(solver.shape) for table in tables))
+    for seen, layout, of_side in zip(sides(material), layouts, of_sides):
+        curves, column = packing.curves(of_side), next(flat)
         numbers = column[:, None] if context.colour is channels else finite_differences.numbers(column, context.number)
         made.append(solver.side(seen, layout, curves, coloured(numbers, solver, context), context))
     return solver.bsdf(material, made)
