@@ -69,14 +69,15 @@ def of_lobe(lobe: RefractedLobe, wi: tuple[float, float, float]) -> Array:
     return np.asarray(light.reshape(BINS, BINS) / max(light.sum(), 1e-30))
 
 
-def modelled(stack: Stack, cosines: Array, often: bool) -> Array:
-    """Light that is reflected, by colour and cosine (3, N, bins, bins); lit from the azimuth 0."""
+def modelled(stack: Stack, cosines: Array, azimuth: float, often: bool) -> Array:
+    """Light that is reflected, by colour and cosine (3, N, bins, bins)."""
     material = Material.of(stack)
     found = parts(material)
     facets = [part for part in found if isinstance(part, Facets)]
-    known, phi = tables.load() if often else None, 0 * cosines
+    known, phi = tables.load() if often else None, np.full_like(cosines, azimuth)
     all_cosines = np.concatenate([cosines, INCIDENCES])
-    solved = energies(material, all_cosines, 0 * all_cosines, known, widths.nearly_straight)
+    around = np.concatenate([phi, 0 * INCIDENCES])
+    solved = energies(material, all_cosines, around, known, widths.nearly_straight)
     lobes, veils, rest = (x[..., : len(cosines)] for x in (solved.lobes, solved.veils, solved.rest))
     albedos = (solved.lobes.sum(axis=0) + solved.veils.sum(axis=0) + solved.rest)[:, len(cosines) :]
     polynomial, _ = remainder.fit(solved.nodes, solved.remainder, INCIDENCES, np.broadcast_to(albedos, (len(rest), 8)))
@@ -86,7 +87,8 @@ def modelled(stack: Stack, cosines: Array, often: bool) -> Array:
     wo, cell = over_the_disc()
     light = np.zeros((3, len(cosines), BINS, BINS))
     for i, cosine in enumerate(cosines):
-        wi = float(np.sqrt(1 - cosine**2)), 0.0, float(cosine)
+        sine = float(np.sqrt(1 - cosine**2))
+        wi = sine * float(np.cos(azimuth)), sine * float(np.sin(azimuth)), float(cosine)
         for k, tensor in enumerate(tensors):
             for shape, energy in ((tensor, lobes[k, :, i]), (widths.veil(found, k, cosines, tensor), veils[k, :, i])):
                 if energy.max() > 1e-6:
@@ -121,7 +123,7 @@ def main() -> None:
     rows: dict[str, list[tuple[float, ...]]] = {kind.name: [] for kind in kinds}
     for kind, walks in every(kinds, (options.half,), options.stacks, options.paths, options.seed, options.truth):
         cosines = np.array([each.cosine for each in walks.incidences])
-        light = modelled(walks.stack, cosines, kind.often)
+        light = modelled(walks.stack, cosines, kind.light.azimuth, kind.often)
         for i, cosine in enumerate(cosines):
             mine, *halves = (
                 symmetric(walks.stack, cosine, grid) for grid in (light[:, i], *walks.grids[:, 0, :, i].astype(float))

@@ -63,6 +63,15 @@ CORRECTION: tuple[tuple[tuple[str, str], float, float], ...] = (
     (("1", "coats"), 0.224, -0.0153),
     (("1", "reflected"), 0.0243, 0.0415),
 )
+# In place of that, for facets that are long along an axis: of products, what they add to the logarithm of a width
+BRUSHED_CORRECTION: tuple[tuple[tuple[str, str], float], ...] = (
+    (("1", "1"), 0.15),
+    (("slant", "across"), 0.43),
+    (("slant", "coats"), -0.44),
+    (("coats", "ratio"), -0.33),
+)
+# Powers by which that fades where coats make the width along an axis, and by which lobes turn with the plane there
+COATS_MAKE = 8, 3
 
 # Light that passes (fidelity.py) -------------------------------------------------------------------------------------
 

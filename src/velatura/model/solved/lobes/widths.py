@@ -8,6 +8,8 @@ light: the cosine at which it meets them grows with their roughness.
 
 What first order leaves open is in `CORRECTION`: light that goes back and forth, and that total reflection picks out.
 It turns above all on how much brighter a lobe is than it would be if its light met each interface once.
+Lobes of metals whose facets are long along an axis have `BRUSHED_CORRECTION` in its place, and turn little with the
+plane of incidence.
 
 Tensors live in the frame of the plane of incidence (x in the plane, y across it), so that they turn with the layers.
 Values are NumPy's, for directions (M,).
@@ -245,13 +247,16 @@ def features(
     brighter = np.log(np.maximum(energy, 1e-9) / np.maximum(expected, 1e-9))
     moved = max((coat.tensor.size * coat.contrast for coat in coats), key=np.max)
     axes = np.array([first.width(first.angle + turn) for turn in AXES])
+    of_coats = 1 - np.minimum(np.array([own.width(first.angle + turn) for turn in AXES]) / axes, 1) ** fitted.Q
     return {
         "1": np.ones_like(sin2),
         "steps": np.full_like(sin2, sum(coat.contrast for coat in coats)),
         "brighter": np.clip(brighter, -1.5, 2.0),
         "slant": sin2,
         "size": np.log(axes),
-        "coats": 1 - np.minimum(np.array([own.width(first.angle + turn) for turn in AXES]) / axes, 1) ** fitted.Q,
+        "coats": of_coats,
+        "across": of_coats[::-1],
+        "ratio": np.log(axes / axes[::-1]),
         "rough": moved,
         "falling": np.full_like(sin2, np.log(max(coat.n_below for coat in coats) / n)),
         "index": np.full_like(sin2, n - 1),
@@ -260,17 +265,32 @@ def features(
         "near": np.minimum((1 - cosine * cosine) / below**2, 1) * (not part.opaque),
         "lost": 1 - let_out / np.maximum(opener.leaving(cos_theta), 1e-3),
         "metal": np.full_like(sin2, float(part.opaque)),
+        "brushed": _brushed(part, own, coats, n * cosine) * part.opaque,
     }
 
 
+def _brushed(part: Facets, own: Tensor, coats: Sequence[_Coat], height: Array) -> Array:
+    """How long facets are along an axis, from 0 to 1: a mean over those that make the width of a lobe."""
+    squares = np.array([own.size**2, *(2 * (coat.moved.size / (2 * height)) ** 2 for coat in coats)])
+    brushed = [part.brushed, *(coat.facets.brushed for coat in coats)]
+    return np.asarray(np.tensordot(brushed, squares, axes=1) / squares.sum(axis=0))
+
+
 def _corrected(first: Tensor, seen: dict[str, Array]) -> Tensor:
-    """The tensor with its axes scaled, and then the components in the plane and across it."""
+    """The tensor with its axes scaled, and then the components in the plane and across it.
+
+    What long facets make lies along them, in any plane of incidence; only what coats add to it turns with the plane.
+    """
     shape = 2, *first.xx.shape
     each = {name: np.broadcast_to(x, shape) for name, x in seen.items()}
     products = np.array([each[a] * each[b] for (a, b), _, _ in fitted.CORRECTION])
     along, to_difference = np.transpose([numbers for _, *numbers in fitted.CORRECTION])
     axes = np.tensordot(along, products, axes=1)
     apart = np.tensordot(to_difference, products.mean(axis=1), axes=1) * seen["slant"]
+    of_brushed = sum(number * each[a] * each[b] for (a, b), number in fitted.BRUSHED_CORRECTION)
+    fades, turns = fitted.COATS_MAKE
+    axes = axes + seen["brushed"] * (1 - each["coats"] ** fades) * (of_brushed - axes)
+    apart = apart * (1 - seen["brushed"] * (1 - each["coats"].max(axis=0)) ** turns)
     fading = seen["steps"] / (seen["steps"] + fitted.CORRECTION_FADE)
     u, v, x = (np.exp(np.clip(fading * each, -fitted.CORRECTION_MAX, fitted.CORRECTION_MAX)) for each in (*axes, apart))
     scaled = Tensor.turned(u * first.width(first.angle), v * first.width(first.angle + AXES[1]), first.angle)
