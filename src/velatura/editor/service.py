@@ -107,7 +107,7 @@ FILES = {f"/environments/{path.name}": path for path in PHOTOGRAPHS.values()}
 
 def session(body: Body) -> Answer:
     """The initial data of the page; nothing is `opened` yet."""
-    return {**_constants(), "opened": None}
+    return {**_constants(), "presets": _presets(Path.cwd()), "opened": None}
 
 
 @functools.cache
@@ -117,7 +117,6 @@ def _constants() -> Answer:
         "version": __version__,
         "schema": {where: _keys(model) for where, model in _RECORDS.items()},
         "layers": {name: _layer(layer) for name, layer in LAYERS.items()},
-        "presets": [_preset(name) for name in presets()],
         "models": [_model(model) for model in MODELS],
         "default_model": DEFAULT,
         "formats": [
@@ -177,6 +176,12 @@ def _titled(name: str) -> str:
     """A name as a heading: `belcour2018` as Belcour 2018."""
     words = re.sub(r"(?<=\D)(?=\d)|[-_]", " ", name)
     return words[:1].upper() + words[1:]
+
+
+@functools.lru_cache(1)
+def _presets(folder: Path) -> list[Answer]:
+    """All presets, their images relative to the working directory."""
+    return [_preset(name) for name in presets()]
 
 
 def _preset(name: str) -> Answer:

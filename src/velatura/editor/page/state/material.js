@@ -40,6 +40,9 @@ export const exteriorOf = ({ mix, exterior = 1 }) => (mix ? exteriorOf(mix[0].ma
 /** The nodes of a tree that are stacks. */
 export const stacksOf = (parts) => parts.flatMap((node) => (node.parts ? stacksOf(node.parts) : [node]));
 
+/** The node of the chosen part; null of a stack. */
+export const chosenPart = ({ parts, part }) => (parts ? stacksOf(parts).find(({ id }) => id === part) : null);
+
 /** The tree of a mixture with the layers of the state in the place of those of the chosen part; null of a stack. */
 export function treeOf({ parts, part, thin, layers }) {
   const filled = (node) => {

@@ -3,7 +3,7 @@
 import { html, nothing, render } from 'lit-html';
 import { Recent } from '../recent.js';
 import { addCoat, setAppearance, setView } from '../state/commands.js';
-import { documentOf, stackOf } from '../state/material.js';
+import { chosenPart, documentOf, stackOf } from '../state/material.js';
 import './appearance.css';
 import { createClass } from './appearance/class.js';
 import { described, handles } from './appearance/handles.js';
@@ -184,7 +184,7 @@ export function mountAppearance(element, services) {
   }
 
   const panel = () => html`<section class="appearance" aria-label="Appearance">
-    ${read.says ? html`<p class="says">${saying()}</p>` : nothing} ${read.target ? lobes() : nothing}
+    ${ofPart(chosenPart(store.get()))} ${read.says ? html`<p class="says">${saying()}</p>` : nothing} ${read.target ? lobes() : nothing}
     ${read.target && !read.says ? [theClass(), theCoat()] : nothing}
     <div class="actions">
       <button type="button" @click=${pin} title="Keep this one on the right of the picture, to compare others with it">
@@ -193,6 +193,10 @@ export function mountAppearance(element, services) {
       ${store.get().view.mode === 'single' ? nothing : html`<button type="button" @click=${unpin}>One picture</button>`}
     </div>
   </section>`;
+
+  /** Which part of a mixture is looked at. */
+  const ofPart = (part) =>
+    part ? html`<p class="says">The lobes of the chosen part alone${part.name ? `, ${part.name}` : ''}.</p>` : nothing;
 
   const saying = () => (read.target ? `Its lobes can be seen, but not dragged. ${capital(read.says)}.` : capital(read.says));
 

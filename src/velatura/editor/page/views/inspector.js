@@ -4,7 +4,7 @@ import { html, nothing, render } from 'lit-html';
 import { Slices, radians } from '../render/slices.js';
 import { setView } from '../state/commands.js';
 import { isPaired } from '../state/compared.js';
-import { chosenOf, enabled, layerName, stacksOf } from '../state/material.js';
+import { chosenOf, chosenPart, enabled, layerName } from '../state/material.js';
 import './inspector.css';
 import { chart, valueAt } from './plots/chart.js';
 import { SIZE, colourAt, disc, outline } from './plots/disc.js';
@@ -164,10 +164,10 @@ export function mountInspector(element, { store, session, viewport, call, lacks,
   }
 
   /** Which part of a mixture is plotted. */
-  const partOf = ({ parts, part }) => {
-    if (!parts) return nothing;
-    const { name } = stacksOf(parts).find(({ id }) => id === part);
-    return html`<p class="waiting">The plots are of the chosen part alone${name ? `, ${name}` : ''}.</p>`;
+  const partOf = (state) => {
+    const part = chosenPart(state);
+    if (!part) return nothing;
+    return html`<p class="waiting">The plots are of the chosen part alone${part.name ? `, ${part.name}` : ''}.</p>`;
   };
 
   const directions = () => html`<div class="chosen">
