@@ -387,6 +387,42 @@ def test_a_stack_is_mixed_with_another_and_is_itself_again(visit: Open, served: 
     assert difference(page.picture(), gold) < SAME
 
 
+def test_a_paint_is_mixed_from_pigments(visit: Open, served: Server) -> None:
+    """Expected: the first pigment is the medium as it was; colours and concentrations move the picture by values."""
+    page = visit()
+    open_preset(page, vt.preset("red-enamel").name)
+    enamel, key = page.picture(), page.page.evaluate("velatura.shader().key")
+    page.page.get_by_label("Describe absorption and scattering by pigments").click()
+    assert difference(page.picture(), enamel) < SAME
+    page.page.get_by_label("Add a pigment", exact=True).click()
+    page.settled()
+    page.page.get_by_label("Name of pigment 1").fill("green")
+    page.page.get_by_label("Name of pigment 1").press("Tab")
+    field = page.page.get_by_label("green, colour, hexadecimal")
+    field.fill("#209040")
+    field.press("Tab")
+    green = page.page.locator("[data-pigment='1']")
+    drag(green.get_by_label("green, concentration, slider"), range(20, 201, 20))
+    page.settled()
+    assert difference(page.picture(), enamel) > OTHER
+    typed = green.get_by_label("green, concentration", exact=True)
+    typed.fill("-2")
+    typed.press("Enter")
+    assert "green, concentration: must lie in 0 to 1000000000, got -2" in said(page).inner_text()
+    typed.fill("3")
+    typed.press("Enter")
+    page.settled()
+    assert page.page.evaluate("velatura.shader().key") == key
+    save_as(page, "paint.yaml")
+    page.page.wait_for_function("() => document.querySelector('.document').textContent.includes('paint.yaml')")
+    medium = next(layer for layer in vt.load(served.folder / "paint.yaml").layers if isinstance(layer, vt.Medium))
+    assert [(each.name, each.concentration) for each in medium.pigments] == [("", 1.0), ("green", 3.0)]
+    page.page.get_by_label("Remove green").click()
+    page.page.get_by_label("Remove pigment 0").click()
+    assert difference(page.picture(), enamel) < SAME
+    assert page.page.get_by_label("Absorption, red", exact=True).count() == 1
+
+
 def test_metals_are_found_by_their_names(visit: Open) -> None:
     """Expected: in groups by what they are, each once, in the order of the alphabet."""
     page = visit()

@@ -57,14 +57,15 @@ layers:
 
 
 def test_pigments_stand_in_place_of_what_follows_from_them(opened: Callable[..., Any], served: Server) -> None:
-    """Expected: their names, no fields of coefficients, a picture that follows their medium, and the same file."""
+    """Expected: their names, no fields of absorption, a picture that follows their medium, and the same file."""
     tabs = Tabs(opened)
     visit = tabs.visit(served.entrance)
     (served.folder / "painted.yaml").write_text(PAINTED, encoding="utf-8")
     visit.page.evaluate("velatura.openFile('painted.yaml')")
     visit.page.wait_for_function("() => velatura.store.get().layers.some(({ keys }) => keys.pigments)")
     before = visit.picture()
-    visit.page.get_by_text("white <b>, pigment 1").wait_for()
+    names = [visit.page.get_by_label(f"Name of pigment {n}") for n in (0, 1)]
+    assert [names[0].input_value(), names[1].get_attribute("placeholder")] == ["white <b>", "pigment 1"]
     assert visit.page.get_by_label("Absorption").count() == 0
     field = visit.page.get_by_label("Depth", exact=True).last
     field.fill("0.01")

@@ -46,10 +46,10 @@ test('a parameter, and a kind of layer, is known by being declared', () => {
   assert.deepEqual(valuesOf('velvet', { fuzz: [1, 2, 3] }), { exterior: 1, layer0_fuzz: [1, 2, 3] });
 });
 
-test('what follows from a phase function and from pigments is left to Python', () => {
+test('what follows from a phase function, and from a table of a pigment, is left to Python', () => {
   assert.deepEqual(valuesOf('medium', {}), { exterior: 1, layer0_depth: 1, layer0_sigma_a: 0, layer0_g: 0 });
   assert.deepEqual(valuesOf('medium', { phase: 'rayleigh' }), { exterior: 1, layer0_depth: 1, layer0_sigma_a: 0 });
-  assert.deepEqual(valuesOf('medium', { pigments: [{ K: 1, S: 2 }] }), { exterior: 1, layer0_depth: 1, layer0_g: 0 });
+  assert.deepEqual(valuesOf('medium', { pigments: [{ pigment: 'blue.csv' }] }), { exterior: 1, layer0_depth: 1, layer0_g: 0 });
 });
 
 test('what varies over the surface is left out', () => {

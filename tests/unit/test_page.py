@@ -16,6 +16,7 @@ from evaluation import evaluate
 
 import velatura as vt
 from velatura import tables
+from velatura.editor.messages import document
 from velatura.editor.service import VERBS
 from velatura.model import named
 from velatura.shader import material, shader
@@ -34,6 +35,15 @@ COATED = {
     ],
     "filmed-pane": [vt.Interface(eta=1.5, alpha=0.1, films=(FILM,)), vt.Interface(eta=1, alpha=0.1, films=(FILM,))],
 }
+PAINT = vt.Stack(
+    [
+        vt.Interface(eta=1.5, alpha=0.1),
+        vt.Medium(
+            g=0.3, pigments=[vt.Pigment(K=[8, 3, 0.5], S=4, concentration=0.3), vt.Pigment(K=0.1, S=[20, 21, 19])]
+        ),
+        vt.Diffuse(albedo=0.5),
+    ]
+)
 TAPES = [
     ("coated-gold", "belcour2018"),
     ("varnished-paint", "yamaguchi2019"),
@@ -87,7 +97,7 @@ def answered() -> tuple[dict[str, Any], list[Any]]:
     """What the page's modules answer for all tapes and presets, and what the tapes come to in NumPy."""
     tapes, truths = zip(*(question(name, model) for name, model in TAPES))
     session = VERBS["session"]({})
-    materials = [each["material"] for each in session["presets"]]
+    materials = [each["material"] for each in session["presets"]] + [document(PAINT)]
     done = node(str(PAGE / "answer.js"), given=json.dumps({"tapes": tapes, "materials": materials, "session": session}))
     assert done.returncode == 0, done.stderr
     return json.loads(done.stdout), list(truths)
@@ -100,11 +110,12 @@ def test_a_tape_runs_as_numpy_does(k: int) -> None:
     np.testing.assert_allclose(answer["columns"][k], truths[k], rtol=1e-9, atol=1e-12)
 
 
-@pytest.mark.parametrize("name", presets())
-def test_flat_values_are_those_of_the_stack(name: str) -> None:
+@pytest.mark.parametrize("number", range(len(presets()) + 1), ids=[*presets(), "pigments"])
+def test_flat_values_are_those_of_the_stack(number: int) -> None:
     """Expected: all but those of films, which shaders have as tables."""
-    found = answered()[0]["values"][presets().index(name)]
-    expected = {address.name: (address, value) for address, value in vt.preset(name).values() if address.film is None}
+    found = answered()[0]["values"][number]
+    stack = [*map(vt.preset, presets()), PAINT][number]
+    expected = {at.name: (at, value) for at, value in stack.values() if at.film is None}
     expected = {key: pair for key, pair in expected.items() if not isinstance(pair[1], Varying)}
     assert set(found) == {key for key in expected if not key.endswith("_conductor")}
     for key, value in found.items():

@@ -55,7 +55,7 @@ from velatura.stack import (
 )
 from velatura.stack.layers import LAYERS, LayerRecord, has
 from velatura.stack.phases import Phase
-from velatura.stack.pigments import Pigments
+from velatura.stack.pigments import CoefficientOf, Pigment, Pigments
 from velatura.stack.schema import Parameter, Record, parameters, unknown
 from velatura.stack.spectra import MIRROR
 from velatura.stack.values import (
@@ -87,6 +87,7 @@ KINDS: dict[type[Parameter], str] = {
     Conductor: "choice",
     Phase: "phase",
     Pigments: "pigments",
+    CoefficientOf: "colour",
     Flag: "flag",
     Text: "text",
 }
@@ -135,6 +136,7 @@ _RECORDS: dict[str, type[Record]] = {
     "part": Part,
     **LAYERS,
     "film": Film,
+    "pigment": Pigment,
     "texture": Texture,
     "brushing": Brushing,
     **phases.RECORDS,
@@ -156,7 +158,7 @@ def _parameter(declared: Parameter, place: FieldInfo) -> Answer:
     known |= {"default": None if place.is_required() else place.default, "texturable": declared.texturable}
     if isinstance(declared, Scalar):
         known |= {"low": declared.low, "high": declared.high, "strict": declared.strict}
-    if isinstance(declared, Films):
+    if isinstance(declared, Films | Pigments):
         known["most"] = declared.most
     if isinstance(declared, Choice):
         known["options"] = declared.options

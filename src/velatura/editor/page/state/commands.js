@@ -2,6 +2,7 @@
 
 import { besideOf, isPaired, slotBeside } from './compared.js';
 import { documentOf, enabled, indices, isBase, isOpaque, layersOf, leavesOf, metalOf, stateOf, variantOf } from './material.js';
+import { coefficientsOf, pigmentOf } from './pigments.js';
 import { titled } from './store.js';
 
 /** The keys of the state that undo leaves alone. */
@@ -194,6 +195,29 @@ export const moveFilm = titled('move a film', (state, id, from, to) =>
 
 export const setFilm = titled('change a film', (state, id, n, key, value) =>
   withFilms(state, id, (films) => films.with(n, { ...films[n], [key]: value })),
+);
+
+// Pigments of a medium, by their number --------------------------------------------------------------
+
+/** Adds a pigment; the first one stands for the absorption and scattering that the medium has, of `given` where it has none. */
+export const addPigment = titled('add a pigment', (state, id, fresh, given) =>
+  changed(state, id, ({ keys }) => {
+    const { sigma_a: a = given.sigma_a, sigma_s: s = given.sigma_s, ...others } = keys;
+    const first = keys.pigments ?? [pigmentOf(a, s, keys.g ?? given.g)];
+    return { keys: { ...others, pigments: keys.pigments ? [...first, fresh] : first } };
+  }),
+);
+
+/** Takes a pigment away; without any, the medium keeps the absorption and scattering of the last one. */
+export const removePigment = titled('remove a pigment', (state, id, n) =>
+  changed(state, id, ({ keys: { pigments, ...keys } }) => {
+    const left = pigments.filter((_, other) => other !== n);
+    return { keys: { ...keys, ...(left.length ? { pigments: left } : coefficientsOf(pigments, keys.g)) } };
+  }),
+);
+
+export const setPigment = titled('change a pigment', (state, id, n, changes) =>
+  changed(state, id, ({ keys }) => ({ keys: { ...keys, pigments: keys.pigments.with(n, { ...keys.pigments[n], ...changes }) } })),
 );
 
 // Kinds of layers ------------------------------------------------------------------------------------

@@ -5,6 +5,8 @@
 // id of the chosen stack, whose node has the layers of the moment when it was chosen. The last weight among siblings is
 // null: what the others leave.
 
+import { coefficientsOf, isKnown } from './pigments.js';
+
 /** Layers with identities, from the document of a stack; the first is numbered `first`. */
 export function layersOf(material, first = 1) {
   return material.layers.map((entry, index) => {
@@ -147,11 +149,11 @@ export function weightsOf(parts, begin = '') {
   });
 }
 
-/** All numbers of a material, those of films as well, in one order for all of a pattern. */
+/** All numbers of a material, those of films and pigments as well, in one order for all of a pattern. */
 export function numbersOf(state, session) {
   const within = (value) => (typeof value === 'object' ? Object.values(value ?? {}).flatMap(within) : [value].filter(Number.isFinite));
-  const films = leavesOf(state).flatMap((leaf) => enabled(leaf).flatMap(({ keys }) => within(keys.films)));
-  return [...Object.values(flat(state, session)).flat(), ...films];
+  const others = leavesOf(state).flatMap((leaf) => enabled(leaf).flatMap(({ keys }) => within([keys.films, keys.pigments])));
+  return [...Object.values(flat(state, session)).flat(), ...others];
 }
 
 /** The numbers of a layer, as [key, value], by the kinds of its parameters in the schema. */
@@ -160,12 +162,18 @@ function ofLayer(keys, parameters, names) {
     const value = keys[key] ?? standard;
     if (kind === 'films' || kind === 'pigments') return [];
     if (key === 'g' && keys.phase !== undefined) return []; // that asymmetry Python knows
-    if (key.startsWith('sigma_') && keys.pigments !== undefined) return []; // these, too
+    if (key.startsWith('sigma_') && keys.pigments !== undefined) return ofPigments(keys, key);
     if (kind === 'pair') return axes(value).map((one, axis) => [`${key}_${'uv'[axis]}`, one]);
     if (kind !== 'index') return [[key, value]];
     return keys.conductor === 'mirror' ? [] : [[key, indices(keys.conductor ?? value, key, names)]];
   });
   return found.filter(([, value]) => typeof value === 'number' || Array.isArray(value));
+}
+
+/** A coefficient that pigments make, as [key, value], unless that takes Python. */
+function ofPigments({ pigments, phase, g }, key) {
+  const found = phase === undefined || key === 'sigma_a' ? coefficientsOf(pigments, g)[key] : undefined;
+  return found === undefined ? [] : [[key, found]];
 }
 
 /** The two of a pair; a locked one has the same twice. */
@@ -190,11 +198,12 @@ export function pattern(state) {
   const shapeOf = ({ kind, keys }) => [
     kind === 'interface' ? (isOpaque({ kind, keys }) ? keys.conductor === 'mirror' : 'dielectric') : kind,
     Object.entries(keys)
-      .filter(([key, value]) => key !== 'films' && typeof shape(value) === 'object')
+      .filter(([key, value]) => key !== 'films' && key !== 'pigments' && typeof shape(value) === 'object')
       .map(([key, value]) => [key, shape(value)]),
     films(keys), // of which code knows no more
     keys.phase ?? 0, // whose asymmetry Python knows
-    keys.pigments ?? 0,
+    (keys.pigments ?? []).filter((one) => !isKnown(one)),
+    keys.pigments !== undefined,
   ];
   const stacks = leavesOf(state).map(({ prefix, thin, layers }) => [prefix, thin, enabled({ layers }).map(shapeOf)]);
   return JSON.stringify([stacks, weightsOf(treeOf(state) ?? []).map(([name, weight]) => [name, shape(weight)])]);

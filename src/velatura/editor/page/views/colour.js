@@ -88,7 +88,7 @@ function swatch({ label, rgb, whole = null, edit }) {
 }
 
 /** A colour to be picked or written, and what is `beside` it. */
-function picks({ label, rgb, whole = null, edit, beside = nothing }) {
+export function picks({ label, rgb, whole = null, edit, beside = nothing }) {
   const { seen, worth } = relative(rgb, whole);
   const written = ({ target }) => {
     const light = ofHex(target.value);

@@ -6,6 +6,7 @@ import { setMetal, setPhase, setValue } from '../state/commands.js';
 import { channelsOf, colour, tint } from './colour.js';
 import { dial, iconButton, menu, number, numberField, texture } from './controls.js';
 import { films } from './films.js';
+import { pigments } from './pigments.js';
 import { chosen, dielectrics, metals } from './names.js';
 
 const NAMES = {
@@ -24,6 +25,7 @@ const NAMES = {
   films: 'Thin films',
   thickness_nm: 'Thickness',
   weight: 'Share',
+  concentration: 'Concentration',
 };
 const SPANS = { eta: [1, 4], k: [0, 10] }; // where sliders for indices end; fields take any
 const PLAIN = { number: 0, pair: 0.1, angle: 0, colour: 0.5, index: 1.5 }; // in place of a texture
@@ -44,9 +46,9 @@ export function parametersOf(layer, schema) {
   return [...INDICES[variantOf(layer)], ...all.filter((key) => !hidden.includes(key))];
 }
 
-/** Parameters of a medium that follow from others, and pigments where there are none. */
+/** Parameters of a medium that follow from others. */
 function unseen({ phase, pigments }) {
-  return [...(phase === undefined ? [] : ['g']), ...(pigments === undefined ? ['pigments'] : ['sigma_a', 'sigma_s'])];
+  return [...(phase === undefined ? [] : ['g']), ...(pigments === undefined ? [] : ['sigma_a', 'sigma_s'])];
 }
 
 /** The colour of a medium, which is that of its absorption; nothing where an image, a table or pigments have it. */
@@ -115,7 +117,7 @@ const FORMS = {
   pair,
   angle,
   phase,
-  pigments: ({ value }) => ({ control: html`<span class="file">${value.map(nameOf).join(', ')}</span>`, extras: nothing }),
+  pigments: (context) => pigments({ ...context, row: (given) => row(context.services, given) }),
   films: (context) => films({ ...context, row: (given) => row(context.services, given) }),
   choice: ({ services, layer, label, edit }) => {
     const groups = metals(services.session.names), value = metalOf(layer.keys);
@@ -251,9 +253,6 @@ function kindOf(phase) {
   if (typeof phase !== 'object') return phase;
   return phase.forward !== undefined ? 'two_lobes' : phase.table !== undefined ? 'phase_table' : 'mie';
 }
-
-/** How a pigment is called: by its name, its file, or its place among the others. */
-const nameOf = ({ name, pigment }, place) => name || pigment?.split('/').at(-1) || `pigment ${place}`;
 
 /** A phase function: by g, or another one by its numbers; a table stays as it is. */
 function phase({ services, layer, label, value, edit, records }) {
