@@ -60,6 +60,18 @@ def test_the_page_is_heard_in_its_own_words() -> None:
     assert editor.stack.layers[0].alpha == 0.25 and editor.model.name == "belcour2018"
 
 
+def test_a_mixture_is_shown_and_follows_the_page() -> None:
+    editor = vt.Editor("half-metallic-paint")
+    fields = editor.get_state("stack")["stack"]
+    assert isinstance(editor.stack, vt.Mix) and len(fields["mix"]) == 2
+    fields["mix"][0]["weight"] = 0.125
+    editor.set_state({"stack": fields})
+    assert editor.stack.flat()["part0_weight"] == 0.125
+    fields["mix"][0]["material"] = "bare-gold"  # which the page writes out
+    editor.set_state({"stack": fields})
+    assert editor.stack.flat()["part0_weight"] == 0.125
+
+
 @pytest.fixture
 def ask(monkeypatch: pytest.MonkeyPatch) -> Callable[..., Any]:
     """Answers of an editor to a message of its page."""

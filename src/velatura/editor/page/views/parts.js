@@ -91,7 +91,7 @@ function card(panel, siblings, node, index) {
       }
       <span class="buttons">
         ${iconButton({ label: `Duplicate ${name}`, icon: 'duplicate', act: () => store.run(duplicatePart, node.id) })}
-        ${iconButton({ label: `Remove ${name}`, icon: 'remove', act: remove })}
+        ${iconButton({ label: `Remove ${name}`, icon: 'remove', act: remove, disabled: siblings.length < 2 })}
       </span>
     </div>
     ${node.weight === null ? rest(siblings) : weight(panel, siblings, node, name)}
