@@ -15,6 +15,7 @@ from velatura.inverse.lobes import interface, stacks
 from velatura.inverse.lobes.interface import DENSER, RARER
 from velatura.inverse.lobes.partial_stack import Layers
 from velatura.inverse.local.dragged import DraggedStack
+from velatura.inverse.nearest import nearest
 from velatura.model import named
 from velatura.model.guards import ALPHA_MIN
 from velatura.model.variance import Isotropic, Roughness
@@ -214,8 +215,9 @@ def test_what_absorbs_above_a_dragged_metal_may_get_thinner_and_no_thicker() -> 
     own_colour = np.array(wish.lobes[1].colour)
     for factor in np.linspace(1, 1.5, 11)[1:]:
         wish = wish.with_lobe(1, energy=tuple(factor * own_colour))
-        there, bound = there.towards(wish)
-        assert bound is None
+        found = nearest(there, wish)
+        there = found.stack
+        assert found.met
     thinner: list[float] = [
         float(np.max(np.array(layer.sigma_a, float))) for layer in there.stack.layers if isinstance(layer, Medium)
     ]

@@ -43,6 +43,9 @@ def invert(
         int, typer.Option(min=1, max=1000, metavar="N", help="Number of stacks; all but the first are random.")
     ] = 1,
     seed: Annotated[int, typer.Option(min=0, max=2**31 - 1, metavar="N", help="Seed of the random stacks.")] = 0,
+    way: Annotated[
+        int, typer.Option(min=0, metavar="N", help="Where there is no stack: take the N-th of the ways out.")
+    ] = 0,
     plot: Annotated[bool, typer.Option("--plot", help="Draw the classes to TARGET, ending in .png, here.")] = False,
     model: options.Model = None,
     settings: Switches = None,
@@ -83,11 +86,16 @@ def invert(
         with progress.clock(f"Solving {Path(target).name}"):
             found = inverse.alternatives(wanted, count, name, seed, **switches)
     except Infeasible as error:
-        if as_json:
-            nearest = error.nearest.to_dict() if error.nearest else None
-            report = {"feasible": False, "model": name, "why": error.why, "nearest": nearest}
-            print(json.dumps(report, allow_nan=False))
-        raise
+        if not 0 < way <= len(error.directions):
+            if as_json:
+                nearest = error.nearest.to_dict() if error.nearest else None
+                report = {"feasible": False, "model": name, "why": error.why, "nearest": nearest}
+                print(json.dumps(report | {"ways": [each.to_dict() for each in error.directions]}, allow_nan=False))
+            raise
+        taken = error.directions[way - 1]
+        if not as_json:
+            print(f"No stack: {error.why}. Taken in its place: {taken.words}.")
+        found = inverse.alternatives(taken.target, count, name, seed, **switches)
     paths = _write(found, output, folder, Path(target).stem)
     if drawn:
         draw_classes(found[0], drawn)

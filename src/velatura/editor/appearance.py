@@ -6,7 +6,6 @@ depends on its request alone, and its lobes are read from the returned stack.
 
 from __future__ import annotations
 
-import dataclasses
 import functools
 from typing import Any
 
@@ -18,9 +17,10 @@ from velatura.figures.bati2021_targets import FIGURES
 from velatura.inverse import Infeasible, Target, coat, invert_stack, solution
 from velatura.inverse.coats import with_albedo
 from velatura.inverse.lobes.interface import conductor_tint
-from velatura.inverse.local.coordinates import Bound, plain
+from velatura.inverse.local.coordinates import plain
 from velatura.inverse.local.dragged import DraggedStack, seen
-from velatura.inverse.reasons import REASONS, UNMET
+from velatura.inverse.nearest import lobes_of, nearest
+from velatura.inverse.reasons import REASONS
 from velatura.model import Model, named
 from velatura.model.registry import stack_lobes
 from velatura.model.roughness_maps import MAPS
@@ -28,12 +28,6 @@ from velatura.model.variance import Roughness
 from velatura.stack import Diffuse, Interface, Stack, Varying
 
 ALIKE = 1e-5  # difference of variances of neighbours that are one lobe
-UNLIKE = 1e-3  # energy or variance by which a stack differs from the nearest that can be dragged, and is shown itself
-EFFORT = solution.EFFORTS[:1]  # to find a stack that is not near
-ROUNDED = 1e-3  # share of an energy by which a wish may be off, that is not worth a word
-OF_BLUR = ("blur", "fixed", UNMET[1])  # reasons that are not about energy
-READINGS = 6  # by a slow model, on the way to a wish that cannot be met
-HALVES = 7  # of the way to a wish that cannot be met
 SAVED = tuple(str(n) for n in range(15, 23))  # figures of Bati et al. 2021
 SAVED_MODEL = "bati2021"
 
@@ -106,9 +100,7 @@ def appearance(body: Body) -> Answer:
         raise InvalidInput(f"interfaces: must be 1 or 2 for each lobe, {len(parts)} in all, got {counts}")
     whole = DraggedStack.of(stack, _target(stack, parts, counts), model)
     assert whole is not None
-    target, itself = whole.now(whole.target), whole.achromatic(whole.of_stack(stack))
-    if whole.missed(itself) > UNLIKE:
-        target = itself
+    target = lobes_of(stack, whole)
     return {
         "target": described(target),
         "haze": haze(target, model),
@@ -230,38 +222,27 @@ def _shown(stack: Stack, model: Model, says: str) -> Answer:
 def invert(body: Body) -> Answer:
     """The stack with the lobes of a target, or of the nearest on the way there; near `material` if that is given.
 
-    With `read`, the lobes that the material has, a model without a closed form is approximated: `rough` says so.
+    With `read`, the lobes that the material has, a model without a closed form is read few times: `rough` says so.
     """
     wish = Target.from_dict(body.get("target"))
     model, material = reader_of(body, wish), body.get("material")
-    near = dragged(body, wish) if material else None
+    near = held(material, wish, model) if material else None
     if near is None:
         if material and any(part.scatters for part in plain(Stack.from_dict(material))):
             return {"feasible": False, "why": "a medium that scatters stays where it is, and the interfaces around it"}
         return _fresh(wish, model)
-    possible = near.achromatic(wish)
-    found, bound = _slowly(possible, near) if near.space.slow else near.towards(possible)
-    if bound is not None and not near.space.slow and not near.rough:
-        other = _elsewhere(possible, near)
-        if other is not None:
-            found, bound = other, None
-        else:
-            found, bound = _approached(possible, near) if near.far(possible) else (found, bound)
-            found = _further(possible, found)
-    says = bound.why(wish) if bound else None
-    if near.coloured:  # the index follows one channel, and films give the others
-        possible = found.now(wish)
-    asked, given = (np.array(target.lobes[0].colour) for target in (wish, possible))
-    if says is None and np.max(np.abs(asked - given)) > ROUNDED * np.max(given):
-        says = f"lobe 1: {REASONS['mirror' if wish.lobes[0].base == 'mirror' else 'colour']}"
-    return answered(found, says)
+    now = lobes_of(Stack.from_dict(material), near)
+    found = nearest(near, wish, now, quick=body.get("read") is not None)
+    answer = answered(found.stack, found.why, found.exact)
+    return answer | ({"material": material} if found.part == 0 else {})
 
 
-def answered(found: DraggedStack, snapped: str | None) -> Answer:
-    """A stack as an answer: the requested one, or the nearest one, with the reason as `snapped`."""
-    stack = _under(found)
-    target = found.now(found.target) if found.rough else seen(stack, found.target, found.model)
-    return _answer(stack, target, found.model, snapped, found.scatters) | ({"rough": True} if found.rough else {})
+def answered(found: DraggedStack, snapped: str | None, exact: bool = True) -> Answer:
+    """A stack as an answer: the requested one, or the nearest one, with the reason as `snapped`; `rough`, unless it is
+    exact."""
+    stack, rough = _under(found), found.rough or not exact
+    target = found.now(found.target) if rough else seen(stack, found.target, found.model)
+    return _answer(stack, target, found.model, snapped, found.scatters) | ({"rough": True} if rough else {})
 
 
 def _answer(stack: Stack, target: Target, model: Model, snapped: str | None, scatters: bool = False) -> Answer:
@@ -284,61 +265,12 @@ def _under(found: DraggedStack) -> Stack:
     return with_albedo(found.stack, np.array(found.diffuse), found.model)
 
 
-def _slowly(wish: Target, near: DraggedStack) -> tuple[DraggedStack, Bound | None]:
-    """Approach the nearest lobes in few readings, each of which takes a while, as `DraggedStack.towards` does in many.
-
-    What the wish changes may give, and what the bound is on; where that is far, another stack may have the lobes.
-    """
-    there = near.met(wish)
-    if isinstance(there, DraggedStack):
-        return there, None
-    of_bound = there.lobe, "blur" if there.reason in OF_BLUR else "energy"
-    found = near.nearest(wish, [*near.changes(wish), of_bound], READINGS).renamed(wish)
-    other = _elsewhere(wish, near) if found.far(wish) else None
-    return (other, None) if other else (found, there)
-
-
-def _elsewhere(wish: Target, near: DraggedStack) -> DraggedStack | None:
-    """A stack with the lobes, found independently of the present one; a medium that scatters would be lost."""
-    if near.scatters:
-        return None
-    found = solution.in_closed_form(wish, near.model.without_tir, EFFORT)
-    fresh = DraggedStack.of(found.stack, wish, near.model) if found else None
-    if fresh is None:
-        return None
-    fresh = dataclasses.replace(fresh, tail=near.tail, name=near.name, diffuse=near.diffuse)
-    moved, bound = fresh.towards(wish)
-    return moved if bound is None else None
-
-
-def _approached(wish: Target, near: DraggedStack) -> tuple[DraggedStack, Bound | None]:
-    """The stack nearest to a distant unreachable wish, by bisection of the way, and then by kept coordinates."""
-    t, found = 0.0, near
-    for n in range(1, HALVES + 1):
-        other = _elsewhere(near.between(wish, t + 0.5**n), near)
-        if other is not None:
-            t, found = t + 0.5**n, other
-    return found.towards(wish)
-
-
-def _further(wish: Target, found: DraggedStack) -> DraggedStack:
-    """Go towards the wished blurs as far as the present energies allow, and then the other way round."""
-    for key in ("alpha", "energy"):
-        part = found.now(wish)
-        for k, lobe in enumerate(wish.lobes):
-            part = part.with_roughness(k, lobe.axes) if key == "alpha" else part.with_lobe(k, energy=lobe.colour)
-        found, _ = found.towards(part)
-    return found
-
-
 def _fresh(wish: Target, model: Model) -> Answer:
     """A stack for a target by itself."""
     found = solution.in_closed_form(wish, model.without_tir)
     fresh = DraggedStack.of(found.stack, wish, model) if found else None
-    if fresh is not None:
-        moved, bound = fresh.towards(wish)
-        if bound is None:
-            return answered(moved, None)
+    if fresh is not None and (there := nearest(fresh, wish)).met:
+        return answered(there.stack, None)
     return _searched(wish, model)
 
 
@@ -352,6 +284,24 @@ def _searched(wish: Target, model: Model) -> Answer:
             return {"feasible": False, "why": error.why}
         found, says = invert_stack(possible[0], model), error.why
     return _answer(found.stack, seen(found.stack, found.target, model), model, says)
+
+
+def ways(body: Body) -> Answer:
+    """Ways out of a target without a stack, the nearest first: `words`, and the `target` that has one, by a slow model
+    with that stack as its `start`. None where the target has a stack, since only the present one was in its way."""
+    wish = Target.from_dict(body.get("target"))
+    try:
+        found = invert_stack(wish, reader_of(body, wish))
+    except Infeasible as error:
+        return {"ways": [{"words": way.words, "target": _plain(way.target)} for way in error.directions]}
+    return {"ways": [{"words": "another stack that has it", "target": _plain(wish, found.stack)}]}
+
+
+def _plain(target: Target, start: Stack | None = None) -> Answer:
+    """A target as a body holds it, and the stack that has it."""
+    start = start or target.start
+    found = described(target.model_copy(update={"start": None}))
+    return found | ({"start": document(start)} if start else {})
 
 
 def _form(target: Target) -> list[tuple[int, str]]:
@@ -396,6 +346,7 @@ def _saved() -> list[Answer]:
 VERBS: dict[str, Verb] = {
     "appearance": appearance,
     "invert": invert,
+    "ways": ways,
     "coat": coated,
     "targets": targets,
 }

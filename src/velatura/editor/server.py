@@ -46,7 +46,8 @@ LANES = {"quick": (4, 512), "picture": (2, 64), "slow": (4, 32)}
 SPARE = 4  # threads of a kind beside these, for answers that were given up, which go on until they end
 LANE_OF = {
     **dict.fromkeys(("shader", "values", "appearance"), "picture"),
-    **dict.fromkeys(("invert", "class", "member", "coat", "targets", "truth", "validation", "film", "export"), "slow"),
+    **dict.fromkeys(("invert", "ways", "class", "member", "coat", "targets"), "slow"),
+    **dict.fromkeys(("truth", "validation", "film", "export"), "slow"),
 }
 
 

@@ -20,7 +20,7 @@ from velatura.model import Model
 EFFORT = ((12, 32), (24, 128))
 SHOWN = 3  # ways out, the nearest ones
 FAR = 4.0  # the logarithm by which quantities change at most
-PAIRED, OTHER, FREED, REMADE = 0.5, 1.0, 0.5, 3.0  # what another form costs, or a change of another lobe
+TINTED, PAIRED, OTHER, FREED, REMADE = 0.5, 0.5, 1.0, 0.5, 3.0  # what another form costs, or a change of another lobe
 SURE = (0.02, 0.002, 2e-4)  # energies of lobes that are almost always possible
 ROUNDING = 1e-9  # by which lobes stay below what there is
 
@@ -279,11 +279,15 @@ def _of_blur(target: Target, n: int) -> Iterator[Way]:
 
 
 def _of_form(target: Target, n: int, last: bool) -> Iterator[Way]:
-    """A lobe of as many interfaces as it has not, with another base, or with nothing fixed."""
+    """A lobe of as many interfaces as it has not, below a medium of its colour, with another base, or with nothing
+    fixed."""
     lobe, what = target.lobes[n], f"lobe {n + 1}"
     forms: list[tuple[str, dict[str, object], float]] = [
         (f"{what} interfaces {3 - lobe.interfaces}", {"interfaces": 3 - lobe.interfaces, "fixed": Fixed()}, PAIRED)
     ]
+    if n == 0 and lobe.interfaces == 1 and lobe.base == "dielectric" and np.ptp(lobe.colour) > 0:
+        tau = tuple((0.5 * np.log(max(lobe.colour) / np.maximum(lobe.colour, LEAST))).tolist())
+        forms.append((f"a tinted medium above {what}", {"fixed": Fixed(tau=(tau,))}, TINTED))
     if last:
         base = "dielectric" if lobe.base == "conductor" else "conductor"
         forms.append((f"{what} base {base}", {"base": base, "fixed": Fixed()}, REMADE))

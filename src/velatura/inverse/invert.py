@@ -14,6 +14,7 @@ from velatura.inverse.explain import infeasible
 from velatura.inverse.lobes import sampling
 from velatura.inverse.lobes.partial_stack import Array
 from velatura.inverse.lobes.target import Target, read
+from velatura.inverse.reasons import Direction
 from velatura.inverse.solution import EFFORTS, Solution, exact, in_closed_form, solutions
 from velatura.model import DEFAULT, Model, named
 from velatura.model.guards import ALPHA_MIN
@@ -43,7 +44,10 @@ def invert_stack(
     wanted = read(target)
     chosen, start = model_of(wanted, model, **switches), wanted.start
     wanted = wanted.model_copy(update={"start": None})
-    found = (start and refined.from_start(start, wanted, chosen)) or search(wanted, chosen)
+    begun = refined.from_start(start, wanted, chosen) if start else None
+    if isinstance(begun, Direction):
+        raise infeasible(wanted, chosen).nearer(begun)
+    found = begun or search(wanted, chosen)
     if found is None:
         raise infeasible(wanted, chosen)
     return found

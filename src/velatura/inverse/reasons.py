@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 from velatura.errors import NoSolution
 from velatura.inverse.lobes.interface import CONDUCTOR_MIN
@@ -32,12 +33,22 @@ UNMET = ("unmet energy", "unmet blur")
 
 @dataclass(frozen=True)
 class Direction:
-    """One way to change a target: the quantity, its description, and the nearest target that has a stack."""
+    """One way to change a target: the quantity, its description, and the nearest target that has a stack.
+
+    why, lobe, constraint: of the refusal, as `Infeasible` has them, where the way itself knows them.
+    """
 
     what: str
     words: str
     change: float
     target: Target
+    why: str | None = None
+    lobe: int = 0
+    constraint: str | None = None
+
+    def to_dict(self) -> dict[str, Any]:
+        """The way as JSON has it."""
+        return {"what": self.what, "words": self.words, "change": self.change, "target": self.target.to_dict()}
 
 
 class Infeasible(NoSolution):
@@ -53,6 +64,11 @@ class Infeasible(NoSolution):
         self.directions = list({direction.words: direction for direction in reversed(directions)}.values())[::-1]
         hints = "; ".join(direction.words for direction in directions)
         super().__init__(f"no stack: {why}" + (f" (possible: {hints})" if hints else ""))
+
+    def nearer(self, way: Direction) -> Infeasible:
+        """The refusal with a way out that comes first, and its reason."""
+        why, constraint = way.why or self.why, way.constraint or self.constraint
+        return Infeasible(why, way.lobe or self.lobe, constraint, [way, *self.directions])
 
     @property
     def nearest(self) -> Target | None:

@@ -18,10 +18,12 @@ from velatura.inverse.lobes import interface, stacks
 from velatura.inverse.lobes.interface import ENERGY_MIN, Choice
 from velatura.inverse.lobes.partial_stack import Array
 from velatura.inverse.lobes.stacks import Partial
-from velatura.inverse.lobes.target import BLUR, Target, distance
+from velatura.inverse.lobes.target import BLUR, Fixed, Target, distance
 from velatura.inverse.local import surrogate
 from velatura.inverse.local.coordinates import Bound, plain
 from velatura.inverse.local.dragged import DraggedStack, seen
+from velatura.inverse.nearest import lobes_of
+from velatura.inverse.nearest import nearest as nearest_from
 from velatura.inverse.reasons import UNMET, Direction, digits
 from velatura.inverse.solution import EFFORTS, Solution, closed_form_paths, in_closed_form, solutions
 from velatura.model import Model
@@ -150,15 +152,26 @@ def moved(found: Solution, target: Target, model: Model, giving: bool = True, ef
     return Solution(target, model, tuple(there.point.layers), there.now(target) if missed else None)
 
 
-def from_start(start: Stack, target: Target, model: Model) -> Solution | None:
-    """A stack itself, if it has the lobes of a target and all that is fixed; or else a stack close to it that has."""
+def from_start(start: Stack, target: Target, model: Model) -> Solution | Direction | None:
+    """A stack itself, if it has the lobes of a target and all that is fixed; or else the answer of `nearest` from it.
+
+    That is a way out where the target is not met. None where the stack is not of the form of the target.
+    """
     layers, dragged = plain(start), DraggedStack.of(start, target, model, with_pins=True)
-    if dragged is None or start.exterior != target.exterior:
+    if dragged is None or start.exterior != target.exterior or not target.kept(layers):
         return None
-    if dragged.snapped(target) == target and target.kept(layers):
+    if dragged.snapped(target) == target:
         return Solution(target, model, tuple(layers))
-    there = moved(Solution(target, model, tuple(layers)), target, model)
-    return there if isinstance(there, Solution) and there.reached is None else None
+    found = nearest_from(dragged, target, lobes_of(start, dragged))
+    has = DraggedStack.of(found.stack.stack, target, model, with_pins=True)
+    assert has is not None
+    if found.met:
+        missed = has.missed(target, has.space.counted) > MISSED
+        return Solution(target, model, tuple(found.stack.point.layers), has.now(target) if missed else None)
+    lobe = 0 if found.lobe is None else found.lobe
+    way = Direction(f"lobe {lobe + 1}", "", 0.0, target)
+    near = has.snapped(target).model_copy(update={"start": found.stack.stack})
+    return dataclasses.replace(_way(way, target, near, model), why=found.why, lobe=lobe + 1, constraint=found.reason)
 
 
 def obstacle(target: Target, model: Model) -> tuple[Bound, Solution] | None:
@@ -260,7 +273,9 @@ def _way(way: Direction, target: Target, near: Target, model: Model) -> Directio
                 for key, entries in lobe.fixed
                 if any(x is not None for x in entries)
             ]
-            words.append(f"lobe {k} fixed {', '.join(pins)}" if pins else f"lobe {k} nothing fixed")
+            tinted = k == 1 and asked.fixed == Fixed() and lobe.fixed == Fixed(tau=lobe.fixed.tau)
+            given = f"lobe {k} fixed {', '.join(pins)}" if pins else f"lobe {k} nothing fixed"
+            words.append("a tinted medium above lobe 1" if tinted else given)
         words += (
             [f"lobe {k} energy {digits(lobe.colour if np.ptp(lobe.colour) else lobe.colour[0])}"]
             if of_energy > SAID

@@ -81,7 +81,8 @@ class Approach:
                 off = float(np.linalg.norm(missing))
                 if off < MET:
                     return x
-                tried = self._step(x, missing, rows @ slopes, free, reach)
+                far = reach * space.reach(x, FURTHER, LITTLE)[free]
+                tried = step_within(space, x, missing, rows @ slopes, free, far, units(x[free]), self.caps)
                 there = space.reading(tried, free)
                 now = self._seen(there.value)
                 nearer = float(np.linalg.norm(rows @ (goal - now)))
@@ -133,54 +134,65 @@ class Approach:
                     rows.append(apart)
         return np.array(rows)
 
-    def _step(self, x: Array, missing: Array, slopes: Array, free: Array, reach: float) -> Array:
-        """The point, within the bounds, to which a step of some coordinates leads that makes up best for what is
-        missing."""
-        space, size = self.start.space, units(x[free])
-        low, high = (end[free] - x[free] for end in space.box)
-        for below, above in self.caps:
-            high[free == below] = x[above] - x[below]
-        far = reach * space.reach(x, FURTHER, LITTLE)[free]
-        low, high = np.maximum(low, -far) / size, np.minimum(high, far) / size
-        high = np.maximum(high, low + 1e-12)
-        a, b = slopes * size, missing
-        kept: list[Bound] = []
-        step = np.zeros(len(free))
-        for _ in range(BOUNDS):
-            step = bounded_step(a, b, STILL, low, high) * size
-            broken = self._broken(x, step, free)
-            if broken is None or broken in kept:
-                break
-            kept.append(broken)
-            margin, change = space.margin_slopes(broken, x, free)
-            a = np.vstack([a, ON_BOUND * change * size])
-            b = np.r_[b, -ON_BOUND * margin]
-        for _ in range(HALVINGS):
-            tried = x.copy()
-            tried[free] += step
-            tried = self._capped(tried)
-            if space.broken(tried, None) is None:
-                return tried
-            step = step / 2
-        return x
 
-    def _broken(self, x: Array, step: Array, free: Array) -> Bound | None:
-        tried = x.copy()
-        tried[free] += step
-        return self.start.space.broken(tried, None)
+def step_within(
+    space: Space,
+    x: Array,
+    missing: Array,
+    slopes: Array,
+    free: Array,
+    far: Array,
+    size: Array,
+    caps: Sequence[tuple[int, int]] = (),
+) -> Array:
+    """The point, within the bounds, to which a step of some coordinates leads that makes up best for what is missing.
 
-    def _capped(self, x: Array) -> Array:
-        """A point whose dielectrics reflect no more than indices within bounds do."""
-        space, x, above = self.start.space, x.copy(), self.start.space.exterior
-        for n, own in enumerate(space.interfaces):
-            if own.log_index is not None:
-                above = float(np.exp(x[own.log_index]))
-            elif own.kind == "dielectric":
-                ends = np.exp([bound.at for bound in space.bounds if bound.interface == n])
-                end = max(ends) if own.side > 0 else min(ends)
-                x[own.reflectances] = np.minimum(x[own.reflectances], fresnel.normal_incidence(end / above))
-                above = float(np.mean(space.layers(x[:, None])[n].eta))
-        return x
+    slopes: over coordinates `free`. far, size: of these, the longest steps and units. caps: coordinates that stay below
+    others.
+    """
+    low, high = (end[free] - x[free] for end in space.box)
+    for below, above in caps:
+        high[free == below] = x[above] - x[below]
+    low, high = np.maximum(low, -far) / size, np.minimum(high, far) / size
+    high = np.maximum(high, low + 1e-12)
+    a, b = slopes * size, missing
+    kept: list[Bound] = []
+    step = np.zeros(len(free))
+    for _ in range(BOUNDS):
+        step = bounded_step(a, b, STILL, low, high) * size
+        broken = space.broken(_moved(x, step, free), None)
+        if broken is None or broken in kept:
+            break
+        kept.append(broken)
+        margin, change = space.margin_slopes(broken, x, free)
+        a = np.vstack([a, ON_BOUND * change * size])
+        b = np.r_[b, -ON_BOUND * margin]
+    for _ in range(HALVINGS):
+        tried = _capped(space, _moved(x, step, free))
+        if space.broken(tried, None) is None:
+            return tried
+        step = step / 2
+    return x
+
+
+def _moved(x: Array, step: Array, free: Array) -> Array:
+    moved = x.copy()
+    moved[free] += step
+    return moved
+
+
+def _capped(space: Space, x: Array) -> Array:
+    """A point whose dielectrics reflect no more than indices within bounds do."""
+    x, above = x.copy(), space.exterior
+    for n, own in enumerate(space.interfaces):
+        if own.log_index is not None:
+            above = float(np.exp(x[own.log_index]))
+        elif own.kind == "dielectric":
+            ends = np.exp([bound.at for bound in space.bounds if bound.interface == n])
+            end = max(ends) if own.side > 0 else min(ends)
+            x[own.reflectances] = np.minimum(x[own.reflectances], fresnel.normal_incidence(end / above))
+            above = float(np.mean(space.layers(x[:, None])[n].eta))
+    return x
 
 
 @dataclass

@@ -29,7 +29,7 @@ from velatura.inverse.lobes.interface import (
 )
 from velatura.inverse.lobes.partial_stack import NORMAL, Array, Layers, named_as, read_whole, variance_of, whole
 from velatura.inverse.lobes.target import Target
-from velatura.inverse.reasons import because
+from velatura.inverse.reasons import UNMET, because
 from velatura.model import Model
 from velatura.model.guards import VARIANCE_MAX
 from velatura.model.papers.adding import lobes
@@ -403,6 +403,14 @@ class Space:
         margins = self.margins(others, x[:, None])[:, 0]
         worst = int(np.argmin(margins))
         return others[worst] if margins[worst] < -SLACK else None
+
+    def unmet(self, reading: int) -> Bound:
+        """What stops a search that misses a reading most, where no bound is in its way."""
+        energies = 3 * self.lobes
+        if reading < energies:
+            return dataclasses.replace(self.bounds[0], lobe=reading // 3, reason=UNMET[0])
+        own = self.interfaces[(reading - energies) // self.entries]
+        return dataclasses.replace(self.bounds[0], lobe=own.lobe, reason=UNMET[1])
 
     def bound_at(self, coordinate: int, x: Array) -> Bound:
         """The bound on a coordinate that a point violates."""

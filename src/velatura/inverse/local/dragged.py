@@ -32,11 +32,8 @@ from velatura.model.registry import stack_lobes
 from velatura.model.variance import Roughness
 from velatura.stack import Diffuse, Interface, Layer, Stack, Varying
 
-ATTEMPTS = 4  # bounds that are tried on the way
 ASIDE = (-0.02, 0.05, -0.1, 0.2)  # by which free choices change, one after the other, to lead past a jump
 SAME = 1e-6  # energies and roughnesses that are as asked
-CHANGED = 0.01  # share of an energy or a roughness that a wish changes it by
-FAR = 0.1  # share of a wish that is a long way
 
 
 @dataclass(frozen=True)
@@ -193,11 +190,6 @@ class DraggedStack:
                 now = now.with_lobe(k, alpha=asked.alpha, variance=asked.variance, rotation=asked.rotation)
         return now
 
-    def between(self, wish: Target, t: float) -> Target:
-        """A target between the present lobes and the wished ones, in energies and variances."""
-        now = self.point.reading.value
-        return self.space.target_of(now + t * (self.space.goal(wish) - now), wish)
-
     def indices(self, n: int) -> tuple[Array, Array | None]:
         """Absolute eta and k of the n-th interface, (3, 1) or (1, 1)."""
         part = self.point.layers[n]
@@ -233,16 +225,6 @@ class DraggedStack:
         return float(np.mean(retinted(own, float(own[channel, 0]), tint)))
 
     # Towards other lobes ---------------------------------------------------------------------------------------------
-
-    def towards(self, wish: Target) -> tuple[DraggedStack, Bound | None]:
-        """The stack with the lobes of a target of the same form, or of one on the way, and the bound that it reaches.
-
-        None for the bound where the target is met.
-        """
-        found = self.met(wish)
-        if isinstance(found, DraggedStack):
-            return found, None
-        return self._part_of_the_way(wish, Problem(self.point, self.space.goal(wish)), found)
 
     def met(self, wish: Target, giving: bool = True, effort: int = 1) -> DraggedStack | Bound:
         """The stack with the lobes of a target of the same form, or the bound that is in the way.
@@ -289,11 +271,11 @@ class DraggedStack:
         spans = may[3 * self.space.lobes :].reshape(len(self.interfaces), -1)
         for span, own in zip(spans, self.interfaces):
             span[:] = (own.lobe, "blur") in loose
-        held, caps = self._constant(wish)
+        held, caps = self.constant(wish)
         point = Approach(self.point, self.space.goal(wish), may, held, caps).solve(readings)
         return dataclasses.replace(self, point=point)
 
-    def _constant(self, target: Target) -> tuple[list[int], list[tuple[int, int]]]:
+    def constant(self, target: Target) -> tuple[list[int], list[tuple[int, int]]]:
         """Coordinates that stay since values of a target are fixed, and those that stay below others.
 
         Indices stay with those of all interfaces above, which they are relative to.
@@ -323,19 +305,6 @@ class DraggedStack:
         """The largest difference of its energies and variances, or `which` of them, from those of a target."""
         return float(np.max(np.abs(self.point.reading.value - self.space.goal(wish))[which]))
 
-    def changes(self, wish: Target) -> list[tuple[int, str]]:
-        """The "energy" or "blur" of which lobes a target asks to be others than the present ones."""
-        found = []
-        for k, (lobe, asked) in enumerate(zip(self.now(wish).lobes, wish.lobes)):
-            for what, now, then in (("energy", lobe.colour, asked.colour), ("blur", lobe.axes, asked.axes)):
-                if np.abs(np.subtract(now, then)).max() > CHANGED * np.abs(now).max():
-                    found.append((k, what))
-        return found
-
-    def far(self, wish: Target) -> bool:
-        """Whether the lobes of a target are far away."""
-        return float(np.max(np.abs(Problem(self.point, self.space.goal(wish)).way))) > FAR
-
     @property
     def coloured(self) -> bool:
         """Whether films alone colour the first lobe, so that its energy in one channel gives those in the others."""
@@ -364,17 +333,6 @@ class DraggedStack:
             if isinstance(other, Solution):
                 return other
         return found
-
-    def _part_of_the_way(self, wish: Target, problem: Problem, bound: Bound) -> tuple[DraggedStack, Bound]:
-        """The stack moved towards a wish as far as one bound after the other allows."""
-        for _ in range(ATTEMPTS):
-            found = problem.solve(Compromise(bound))
-            if isinstance(found, Solution):
-                return dataclasses.replace(self, point=found.point).renamed(self.between(wish, found.part)), bound
-            if found == bound:
-                break
-            bound = found
-        return self.renamed(self.now(wish)), bound
 
     def _giving(self, bound: Bound, held: Sequence[int]) -> list[int]:
         """Kept coordinates that may change at a bound: those of the nearest lobe first."""

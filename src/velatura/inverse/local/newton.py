@@ -173,11 +173,7 @@ class Problem:
         space = self.start.space
         if ends := self._ends(nearest):
             return ends[0]
-        reading, energies = int(space.counted[nearest.worst]), 3 * space.lobes
-        if reading < energies:
-            return replace(space.bounds[0], lobe=reading // 3, reason=UNMET[0])
-        own = space.interfaces[(reading - energies) // space.entries]
-        return replace(space.bounds[0], lobe=own.lobe, reason=UNMET[1])
+        return space.unmet(int(space.counted[nearest.worst]))
 
     def _ends(self, nearest: Nearest) -> list[Bound]:
         """The bounds that the coordinate lies on whose reading misses most."""

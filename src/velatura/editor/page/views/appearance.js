@@ -42,6 +42,8 @@ export function mountAppearance(element, services) {
   let refused = null; // why it could not: {lobe, text}
   let held = false;
   let rough = null; // wish whose answer is approximate
+  let origin = null; // material that the wishes of a step start from
+  let ways = null; // ways out of the wish that could not be had: {words, target}
   let chosen = 0;
   let unlocked = null; // the lobe whose axes are shown though they are alike
   let coat = COAT;
@@ -64,7 +66,7 @@ export function mountAppearance(element, services) {
   async function follow() {
     if (!element.checkVisibility() || now() === text) return paint();
     text = now();
-    [asked, coatLobe, coatSays] = [null, null, ''];
+    [asked, origin, ways, coatLobe, coatSays] = [null, null, null, null, ''];
     const key = text;
     reading++;
     try {
@@ -89,7 +91,8 @@ export function mountAppearance(element, services) {
     paint();
   }
 
-  // Wishes: one is asked for at a time, and it starts from the material that is there then
+  // Wishes: one is asked for at a time; lobes are wished for from the material that the step began with, so that the
+  // answer depends on the wish alone, and not on the way of the hand
 
   const wishes = oneAtATime(async (wish) => {
     const { verb, body, command } = wish;
@@ -97,7 +100,8 @@ export function mountAppearance(element, services) {
     try {
       // While it is held, an answer may be approximate: from the lobes that the material is known to have
       const known = held && read.target ? { read: read.target } : {};
-      const answer = await ask(verb, { ...body, ...question(), ...known });
+      const whole = { ...question(), ...body, ...known };
+      const answer = (await ask(verb, whole)) ?? (held ? null : await call(verb, whole)); // what rests is answered
       if (!answer || before !== now()) return;
       rough = answer.rough ? wish : null;
       accept(answer, command);
@@ -108,12 +112,12 @@ export function mountAppearance(element, services) {
   }, () => held || comeToRest());
 
   function accept({ material, target, haze, held: holds, snapped, why }, command) {
-    refused = snapped || why ? about(snapped ?? why) : null;
+    [refused, ways] = [snapped || why ? about(snapped ?? why) : null, null];
     if (!material) return paint();
     read = { target, haze, held: holds, snapped, says: null };
     text = textOf(material, store.get());
     known.set(text, read);
-    edits.drag('appearance', command, material);
+    if (text !== now()) edits.drag('appearance', command, material); // what is refused is no step
     paint();
   }
 
@@ -137,7 +141,9 @@ export function mountAppearance(element, services) {
   }
 
   function settle() {
+    if (refused && asked && origin) findWays();
     if (!refused) asked = null;
+    origin = null;
     edits.settle();
     classes.follow();
     paint();
@@ -146,9 +152,31 @@ export function mountAppearance(element, services) {
   /** Requests changes of a lobe; earlier requests of the same drag remain. */
   function wish(index, changes) {
     chosen = index;
+    origin ??= documentOf(store.get());
     asked = changed(underHand(), index, changes);
-    want({ verb: 'invert', body: { target: asked }, command: setAppearance });
+    want({ verb: 'invert', body: { target: asked, material: origin }, command: setAppearance });
     paint();
+  }
+
+  /** Asks for ways out of a wish that was refused. */
+  async function findWays() {
+    const wish = asked;
+    const { model, switches } = store.get();
+    try {
+      const answer = await call('ways', { target: wish, model, switches });
+      if (answer && wish === asked) ways = answer.ways;
+      paint();
+    } catch (error) {
+      messages.fail('appearance', error);
+    }
+  }
+
+  /** Takes a way out, as one step. */
+  function take({ target }) {
+    const { start, ...wished } = target;
+    asked = null;
+    want({ verb: 'invert', body: { target: wished, material: start }, command: setAppearance });
+    letGo();
   }
 
   const once = (index, changes) => {
@@ -224,7 +252,7 @@ export function mountAppearance(element, services) {
     <ol class="lobes" aria-label="Lobes">
       ${read.target.lobes.map((lobe, index) => [row(lobe, index), refusal(index), between(index)])}
     </ol>
-    ${refused && refused.lobe === null ? html`<p class="problem">${capital(refused.text)}.</p>` : nothing}
+    ${refused && refused.lobe === null ? html`<p class="problem">${capital(refused.text)}.</p>${waysOut()}` : nothing}
     <fieldset ?disabled=${Boolean(read.says)}>
       <legend>Lobe ${chosen + 1}</legend>
       ${controls(underHand().lobes[chosen], chosen)}
@@ -253,7 +281,15 @@ export function mountAppearance(element, services) {
       ? html`<li class="refused">
           ${asked ? html`Asked: ${difference(asked.lobes[index], read.target.lobes[index])}.` : nothing}
           ${capital(refused.text)}.
+          ${waysOut()}
         </li>`
+      : nothing;
+
+  const waysOut = () =>
+    ways?.length
+      ? html`<div class="actions" role="group" aria-label="Ways out">
+          ${ways.map((way) => html`<button type="button" @click=${() => take(way)}>${capital(way.words)}</button>`)}
+        </div>`
       : nothing;
 
   function between(index) {

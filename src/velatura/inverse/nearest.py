@@ -1,0 +1,218 @@
+"""The answer to a wish from a present stack: the same for the editor, under the hand and at rest, and for `invert`.
+
+The wish is met if a stack with its lobes is found. Otherwise the answer has the nearest lobes: of those on the straight
+line from the present lobes to the wish, in energies and variances, the last ones that a stack is found for. So what the
+wish does not change stays. There are two exceptions. A lobe above which nothing absorbs is grey: a colour is first
+replaced by its mean. And a metal as bright as can be that is to be blurred more gives up as much energy as it must.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+from dataclasses import dataclass
+
+import numpy as np
+
+from velatura.inverse.lobes.target import Target
+from velatura.inverse.local.coordinates import Bound
+from velatura.inverse.local.dragged import DraggedStack
+from velatura.inverse.local.line import EXACT, Line, Reached
+from velatura.inverse.reasons import because
+from velatura.inverse.solution import EFFORTS, in_closed_form
+from velatura.stack import Stack
+
+EFFORT = EFFORTS[:1]  # to find a stack that is not near
+READINGS, QUICK_READINGS = 10, 4  # of a slow model, of one line
+QUICK = 2e-3  # by which an answer under the hand may miss its place on the line, in units of readings
+SHORTER = (1.0, 0.9)  # shares of the part that is found which are tried where a search does not end on the line
+ON_LINE, QUICKLY_ON_LINE = 1e-3, 2e-2  # what an answer may miss the line by
+SAME = 1e-5  # difference of roughnesses of a blur that stays
+CLOSE = 0.05  # part of the way from which a wish is met by itself
+UNLIKE = 1e-3  # energy or variance by which a stack differs from the nearest that can be dragged, and is taken itself
+HALVINGS = 6  # of the way that is left, where other searches are looked at
+DIMMED = 0.7  # share of the energy of a lobe that it has in any case if it is blurred more
+LEAST = 1e-3  # part of the way that is no change
+ROUNDED = 1e-3  # share of an energy by which a wish may be off, that is not worth a word
+
+
+@dataclass(frozen=True)
+class Nearest:
+    """The nearest stack to a wish.
+
+    part: of the way to the wish, 1 where it is met. lobe, reason: the lobe, from 0, that keeps the answer from the
+    wish, and the key of why in `REASONS`; None where nothing does. exact: False for an answer under the hand.
+    """
+
+    stack: DraggedStack
+    wish: Target
+    part: float = 1.0
+    lobe: int | None = None
+    reason: str | None = None
+    exact: bool = True
+
+    @property
+    def met(self) -> bool:
+        """Whether the stack has the lobes of the wish."""
+        return self.reason is None
+
+    @property
+    def why(self) -> str | None:
+        """Why the wish is not met, in words."""
+        return None if self.reason is None or self.lobe is None else because(self.lobe, self.reason, self.wish)
+
+    @property
+    def reached(self) -> Target:
+        """The lobes of the stack."""
+        return self.stack.now(self.wish)
+
+
+def nearest(present: DraggedStack, wish: Target, now: Target | None = None, quick: bool = False) -> Nearest:
+    """The nearest stack to a wish from a present one.
+
+    now: the present lobes, where they are not quite those of a stack that can be dragged, as of metals by spectra.
+    quick: by few readings of a slow model, under the hand.
+    """
+    possible = present.achromatic(wish)
+    grey = _colour_lost(present, wish, possible)
+    if present.missed(possible, present.space.counted) < EXACT:
+        return _told(Nearest(present.renamed(possible), wish), grey)
+    now = now or present.now(possible)
+    found, bound, part = _along(present, now, possible, quick)
+    if bound is not None and (other := _elsewhere(present, possible, quick)) is not None:
+        found, bound, part = other, None, 1.0
+    if bound is not None and not present.space.slow:
+        found, part = _further(present, now, possible, found, part)
+    if bound is not None and (dimmer := _dimmed(present, now, possible, bound, quick)) is not None:
+        found, part = dimmer, 1.0
+    if bound is None and not quick:
+        found = _met(found, possible) or found
+    if part < LEAST:
+        found, part = present.renamed(present.now(possible)), 0.0
+    answer = Nearest(found, wish, part, exact=not (quick and present.space.slow))
+    if bound is not None:
+        return dataclasses.replace(answer, lobe=bound.lobe, reason=_named(bound, wish))
+    return _told(answer, grey or _colour_lost(present, wish, found.now(wish) if present.coloured else possible))
+
+
+def _told(answer: Nearest, grey: str | None) -> Nearest:
+    return dataclasses.replace(answer, lobe=0, reason=grey) if grey else answer
+
+
+def _named(bound: Bound, wish: Target) -> str:
+    """The reason for a bound: that an index ends is that it reflects too little, unless it is fixed."""
+    lobe = wish.lobes[bound.lobe]
+    if bound.reason in ("index", "absorption") and lobe.fixed.of("eta", lobe.interfaces - 1) is None:
+        return "energy" if lobe.base == "dielectric" else "bright"
+    return bound.reason
+
+
+def _dimmed(present: DraggedStack, now: Target, wish: Target, bound: Bound, quick: bool) -> DraggedStack | None:
+    """The stack with the wished blur of a lobe that must give up energy for it, as little as it can: facets lose light,
+    and nothing reflects more. None where the wish asks for other energy, or this is not the reason."""
+    k = bound.lobe
+    lobe, before = wish.lobes[k], now.lobes[k]
+    dimmed = np.abs(np.subtract(lobe.colour, before.colour)).max() > ROUNDED
+    if _named(bound, wish) != "bright" or dimmed or lobe.roughness <= before.roughness + SAME:
+        return None
+    dim, stopped, _ = _along(present, now, wish.with_energy(k, DIMMED * np.array(lobe.colour)), quick)
+    if stopped is not None:
+        return None
+    return _along(dim.at(dim.point.x), dim.now(wish), wish, quick)[0]
+
+
+def _colour_lost(present: DraggedStack, wish: Target, possible: Target) -> str | None:
+    """The reason why the first lobe cannot have the colour that is wished for, if it cannot."""
+    asked, given = (np.array(target.lobes[0].colour) for target in (wish, possible))
+    if np.max(np.abs(asked - given)) <= ROUNDED * np.max(given):
+        return None
+    return "mirror" if wish.lobes[0].base == "mirror" else "colour"
+
+
+def _along(start: DraggedStack, now: Target, wish: Target, quick: bool) -> tuple[DraggedStack, Bound | None, float]:
+    """The last stack on the line to a wish, the bound there, and the part of the way.
+
+    A search that ends beside the line is begun again for a part of the way, unless it is quick.
+    """
+    here, goal = _readings(start, now, now), _readings(start, now, wish)
+    allowed = QUICKLY_ON_LINE if quick else ON_LINE
+    found = first = _last(start, here, goal, wish, quick)
+    share = 1.0
+    for shorter in () if quick else SHORTER:
+        if found.off < allowed and found.part < 1 + allowed:
+            break
+        share = shorter * min(max(first.part, 0.0), 1.0)
+        found = _last(start, here, here + share * (goal - here), wish, quick)
+    if found.off >= allowed or found.part >= 1 + allowed:
+        found = Reached(start.point, 0.0, 0.0, first.bound)
+    stack = dataclasses.replace(start, point=found.point).renamed(wish)
+    if share < 1 or found.part == 0:
+        return stack, first.bound or start.space.unmet(int(np.argmax(np.abs(goal - here)))), share * found.part
+    close = not quick and found.off < CLOSE and abs(1 - found.part) < CLOSE
+    if found.bound is not None and close and (met := _met(stack, wish)) is not None:
+        return met, None, 1.0
+    return stack, found.bound, found.part
+
+
+def _further(
+    present: DraggedStack, now: Target, wish: Target, found: DraggedStack, part: float
+) -> tuple[DraggedStack, float]:
+    """The stack that other searches find further on the line, by bisection, and the part of the way there."""
+    here, goal = _readings(present, now, now), _readings(present, now, wish)
+    end = 1.0
+    for _ in range(HALVINGS):
+        middle = (part + end) / 2
+        asked = present.space.target_of(here + middle * (goal - here), wish)
+        stack, bound, _ = _along(found, found.now(asked), asked, False)
+        other = stack if bound is None else _elsewhere(present, asked, False)
+        if other is None:
+            end = middle
+        else:
+            found, part = other, middle
+    return found.renamed(wish), part
+
+
+def _readings(start: DraggedStack, now: Target, wish: Target) -> np.ndarray:
+    """Readings of a wish; of lobes whose blur stays, each interface keeps its own."""
+    goal = start.space.goal(wish)
+    own = goal[3 * start.space.lobes :].reshape(len(start.interfaces), -1)
+    for n, interface in enumerate(start.interfaces):
+        blur, asked = (np.array(target.lobes[interface.lobe].axes) for target in (now, wish))
+        if np.abs(blur - asked).max() < SAME:
+            own[n] = start.variances[n]
+    return goal
+
+
+def _last(start: DraggedStack, here: np.ndarray, goal: np.ndarray, wish: Target, quick: bool) -> Reached:
+    line = Line(start.point, here, goal, *start.constant(wish), enough=QUICK if quick else EXACT)
+    return line.last(QUICK_READINGS if quick else READINGS)
+
+
+def _met(stack: DraggedStack, wish: Target) -> DraggedStack | None:
+    """The stack moved to where it has the lobes of a close wish, to rounding."""
+    if wish.pinned:
+        return None
+    found = stack.at(stack.point.x).met(wish, giving=False, effort=0)
+    return found if isinstance(found, DraggedStack) else None
+
+
+def _elsewhere(present: DraggedStack, wish: Target, quick: bool) -> DraggedStack | None:
+    """A stack with the lobes, found independently of the present one; a medium that scatters would be lost."""
+    if present.scatters:
+        return None
+    found = in_closed_form(wish, present.model.without_tir, EFFORT)
+    fresh = DraggedStack.of(found.stack, wish, present.model, with_pins=True) if found else None
+    if fresh is None:
+        return None
+    fresh = dataclasses.replace(fresh, tail=present.tail, name=present.name, diffuse=present.diffuse)
+    here, goal = fresh.point.reading.value, _readings(fresh, fresh.now(wish), wish)
+    there = _last(fresh, here, goal, wish, quick)
+    stack = dataclasses.replace(fresh, point=there.point).renamed(wish)
+    if there.bound is None:
+        return stack
+    return None if quick or there.off > CLOSE else _met(stack, wish)
+
+
+def lobes_of(stack: Stack, dragged: DraggedStack) -> Target:
+    """The lobes of a stack, also where they are not quite those of the nearest one that can be dragged."""
+    itself = dragged.achromatic(dragged.of_stack(stack))
+    return itself if dragged.missed(itself) > UNLIKE else dragged.now(dragged.target)

@@ -1,0 +1,104 @@
+"""One answer to a wish: under the hand, at rest, and by `invert_stack` from the same material."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+
+import velatura as vt
+from velatura.editor import appearance
+from velatura.inverse import Infeasible, Target, invert_stack
+from velatura.inverse.local.dragged import DraggedStack, seen
+from velatura.inverse.nearest import Nearest, nearest
+from velatura.model import named
+from velatura.stack import Stack
+
+pytestmark = pytest.mark.usefixtures("one_thread")
+
+AVERAGED = named("bati2021")
+PLASTIC = Stack(
+    [vt.Interface(eta=1.5, alpha=0.1), vt.Medium(sigma_a=(0.1, 0.3, 0.6)), vt.Interface(eta=1.8, alpha=0.2)]
+)
+METAL = Stack(
+    [vt.Interface(eta=1.5, alpha=0.1), vt.Medium(sigma_a=0.1), vt.Interface(eta=0.5, k=(3, 2.5, 2), alpha=0.2)]
+)
+
+
+def lobes_of(stack: Stack) -> Target:
+    base = "conductor" if stack.interfaces[-1].opaque else "dielectric"
+    return seen(stack, Target([{"energy": 0.1}, {"energy": 0.1, "base": base}]), AVERAGED)
+
+
+def answer(stack: Stack, wish: Target) -> Nearest:
+    present = DraggedStack.of(stack, wish, AVERAGED)
+    assert present is not None
+    return nearest(present, wish)
+
+
+@pytest.mark.parametrize("stack", [PLASTIC, METAL], ids=["plastic", "metal"])
+@pytest.mark.parametrize("change", [0.2, 2.0, 30.0])
+def test_what_a_wish_does_not_change_stays(stack: Stack, change: float) -> None:
+    """Expected: a wish is met, or the answer lies on the line to it, and just beyond there is no stack."""
+    now = lobes_of(stack)
+    for k, other in ((0, 1), (1, 0)):
+        wish = now.with_energy(k, np.minimum(change * np.array(now.lobes[k].colour), 0.95))
+        found = answer(stack, wish)
+        has = seen(found.stack.stack, wish, AVERAGED)
+        assert has.lobes[other].colour == pytest.approx(now.lobes[other].colour, abs=2e-5)
+        assert [lobe.roughness for lobe in has.lobes] == pytest.approx([lobe.roughness for lobe in now.lobes], abs=2e-5)
+        there = np.array(now.lobes[k].colour) + found.part * np.subtract(wish.lobes[k].colour, now.lobes[k].colour)
+        assert has.lobes[k].colour == pytest.approx(tuple(there), abs=2e-5)
+        assert found.met == (found.part > 0.9999)
+        if not found.met:
+            beyond = np.array(now.lobes[k].colour) + min(found.part + 0.03, 1) * np.subtract(
+                wish.lobes[k].colour, now.lobes[k].colour
+            )
+            assert not answer(stack, now.with_energy(k, beyond)).met
+
+
+def test_a_lobe_below_nothing_that_absorbs_gets_the_mean_of_a_colour() -> None:
+    now = lobes_of(PLASTIC)
+    found = answer(PLASTIC, now.with_energy(0, (0.06, 0.03, 0.03)))
+    assert not found.met and found.reason == "colour" and found.part == pytest.approx(1)
+    assert found.reached.lobes[0].colour == pytest.approx((0.04,) * 3, abs=1e-6)
+
+
+def test_a_wish_gets_one_answer_by_all_ways() -> None:
+    """Gold under a coat whose energy no index gives; its own lobes are those of its spectrum."""
+    gold = vt.preset("coated-gold")
+    body = {"material": gold.to_dict(), "model": "velatura"}
+    now = Target.from_dict(appearance.appearance(body)["target"])
+    wish = now.with_energy(0, (0.32, 0.32, 0.32))
+    asked = {**body, "target": appearance.described(wish)}
+    rest, hand = appearance.invert(asked), appearance.invert({**asked, "read": appearance.described(now)})
+    with pytest.raises(Infeasible) as error:
+        invert_stack(wish.model_copy(update={"start": gold}))
+    assert error.value.nearest is not None and hand["rough"] and rest["snapped"] == error.value.why
+    energies: list[Any] = [Target.from_dict(one["target"]).lobes for one in (rest, hand)]
+    energies.append(error.value.nearest.lobes)
+    own, of_gold = np.array([[lobe.colour for lobe in lobes] for lobes in energies]).swapaxes(0, 1)
+    assert own[0] == pytest.approx(own[2], abs=2e-3) and own[1] == pytest.approx(own[0], rel=0.02)
+    assert of_gold == pytest.approx(np.array([now.lobes[1].colour] * 3), abs=5e-3)
+    assert own[0, 0] > 0.26
+
+
+def test_a_refused_wish_leaves_the_material_as_it_is() -> None:
+    """At the bound already: the material itself comes back, so that undo has no step of it."""
+    glass = Stack([vt.Interface(eta=4.0)])
+    body = {"material": glass.to_dict(), "model": "bati2021"}
+    now = appearance.appearance(body)["target"]
+    now["lobes"][0]["energy"] = [0.6] * 3
+    answered = appearance.invert({**body, "target": now})
+    assert answered["snapped"] == "lobe 1: no index up to 4 reflects as much"
+    assert answered["material"] == glass.to_dict()
+
+
+def test_ways_out_bring_what_takes_them() -> None:
+    target = {"lobes": [{"energy": [0.06, 0.03, 0.03], "alpha": 0.1}]}
+    ways = appearance.ways({"target": target, "model": "bati2021"})["ways"]
+    tinted = next(way for way in ways if way["words"] == "a tinted medium above lobe 1")
+    found = appearance.invert({"target": tinted["target"], "model": "bati2021"})
+    assert found["snapped"] is None and "medium" in found["material"]["layers"][0]
+    assert found["target"]["lobes"][0]["energy"] == pytest.approx([0.06, 0.03, 0.03], abs=1e-6)
