@@ -94,7 +94,7 @@ def test_a_smooth_coat_does_not_turn_the_lobe_of_long_facets(rotation: float, az
     layers = found(Interface(eta=1.5), Interface(eta=0.3, k=3.0, alpha=(0.3, 0.025), rotation=rotation))
     cosines = np.array([1.0, 0.35, 0.08])
     energies = np.array([[0.05, 0.1, 0.5], [0.8, 0.7, 0.3]])
-    _, lobe = widths.roughnesses(layers, cosines, np.full(3, azimuth), energies)
+    _, lobe = roughnesses(layers, cosines, np.full(3, azimuth), energies)
     np.testing.assert_allclose(np.degrees(lobe.rotation), rotation, atol=0.8)
 
 

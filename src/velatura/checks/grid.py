@@ -106,7 +106,7 @@ def _lines(samples: Array, density: Array, low: float, high: float) -> Array:
 
 
 def _sharpest(samples: Array, density: Array) -> Array:
-    """As many of the samples, each as often as the root of its density says, where that is a number."""
+    """Samples, as many as there are, each as often as the root of its density says, where that is a number."""
     order = np.argsort(samples)
     reached = np.cumsum(np.sqrt(np.nan_to_num(np.maximum(density[order], 0.0), posinf=0.0)))
     wanted = (np.arange(len(samples)) + 0.5) / max(len(samples), 1) * reached[-1:]

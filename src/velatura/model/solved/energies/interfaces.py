@@ -219,7 +219,7 @@ class _Blocked(NamedTuple):
 
 
 def _blocked(sides: Sequence[Facets], setting: Setting) -> list[_Blocked]:
-    """What each side blocks, where facets are met often; kept for the same facets with other beams."""
+    """Light that each side blocks, where facets are met often; kept for the same facets with other beams."""
     if setting.often is None:
         return []
     key = setting.dark.key
