@@ -14,7 +14,7 @@ import numpy as np
 from velatura.editor.messages import LOBES, Answer, Body, Verb, document, model_of, stack_of
 from velatura.errors import InvalidInput, NoSolution
 from velatura.figures.bati2021_targets import FIGURES
-from velatura.inverse import Infeasible, Target, coat, invert_stack, solution
+from velatura.inverse import Fixed, Infeasible, Target, coat, invert_stack, solution
 from velatura.inverse.coats import with_albedo
 from velatura.inverse.lobes.interface import conductor_tint
 from velatura.inverse.local.coordinates import plain
@@ -280,6 +280,7 @@ def _searched(wish: Target, model: Model) -> Answer:
         found, says = invert_stack(wish, model), None
     except Infeasible as error:
         possible = [way.target for way in error.directions if _form(way.target) == _form(wish)]
+        possible.sort(key=lambda target: _more_fixed(target, wish))  # a medium is added where it is asked for
         if not possible:
             return {"feasible": False, "why": error.why}
         found, says = invert_stack(possible[0], model), error.why
@@ -302,6 +303,11 @@ def _plain(target: Target, start: Stack | None = None) -> Answer:
     start = start or target.start
     found = described(target.model_copy(update={"start": None}))
     return found | ({"start": document(start)} if start else {})
+
+
+def _more_fixed(target: Target, wish: Target) -> bool:
+    """Whether a target fixes something of a lobe of which the wish fixes nothing."""
+    return any(asked.fixed == Fixed() != lobe.fixed for asked, lobe in zip(wish.lobes, target.lobes))
 
 
 def _form(target: Target) -> list[tuple[int, str]]:
