@@ -39,8 +39,8 @@ MAY_IMPORT = {
     "programs": "light stack optics renderer model reference binding kernel pictures",
     "bakes": "programs",  # and `imports`: public names
     "imports": "programs",
-    "exports": "stack model shader programs",
-    "inverse": "stack optics tables model ops films kernel",
+    "exports": "stack model shader programs api kernel",
+    "inverse": "stack optics tables model ops films api kernel",
     "light": "renderer",
     "reference": "light stack optics ops kernel binding renderer films media metals",
     "checks": "renderer kernel",

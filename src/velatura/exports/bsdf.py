@@ -196,8 +196,6 @@ def _continued(value: Array, known: NDArray[np.bool_]) -> Array:
 
 def _notes(drawn: _Drawn, path: str) -> tuple[str, ...]:
     """How far Mitsuba's plugin with the file is from ours, and what is left out."""
-    import drjit as dr
-
     mi, context = drawn.mi, drawn.mi.BSDFContext()
     rng = np.random.default_rng(0)
     si = mi.SurfaceInteraction3f()
@@ -208,7 +206,8 @@ def _notes(drawn: _Drawn, path: str) -> tuple[str, ...]:
     drawn_there, weight = drawn.bsdf.sample(context, si, mi.Float(u[0]), mi.Point2f(u[1:]))
     smooth = np.array(mi.has_flag(drawn_there.sampled_type, mi.BSDFFlags.Delta))
     below = np.array(drawn_there.wo.z) < 0
-    density = np.array(dr.select(drawn_there.pdf > 0, drawn_there.pdf, dr.inf))
+    density = np.array(drawn_there.pdf)
+    density[density <= 0] = np.inf
     own = drawn.bsdf.eval(context, si, drawn_there.wo)
     theirs = mi.load_dict({"type": "measured", "filename": path}).eval(context, si, drawn_there.wo)
     one, other = (np.where(below | smooth, 0, np.array(each) / density).mean(axis=0) for each in (own, theirs))

@@ -58,12 +58,11 @@ def model_error(found: Fit, directions: Directions, walks: int = 1000, seed: int
 
 def _half(mi: Any, bsdf: Any, directions: Directions, count: int, half: int) -> Array:
     """The mean (3, N) of so many estimates of f cos theta_o; others for each `half`."""
-    import drjit as dr
-
     total, done = np.zeros(directions.wo.shape), 0
     while done < count:
         now = min(max(BATCH // directions.wo.shape[1], 1), count - done)
-        si = dr.zeros(mi.SurfaceInteraction3f, now * directions.wo.shape[1])
+        si = mi.SurfaceInteraction3f()
+        si.p = mi.Point3f(np.zeros((3, now * directions.wo.shape[1])))
         si.wi = mi.Vector3f(np.tile(directions.wi, now))
         # The random numbers of an estimate follow from where it is asked for
         which = np.arange(done, done + now) + half * count

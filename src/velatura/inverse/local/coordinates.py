@@ -405,7 +405,7 @@ class Space:
         return others[worst] if margins[worst] < -SLACK else None
 
     def unmet(self, reading: int) -> Bound:
-        """What stops a search that misses a reading most, where no bound is in its way."""
+        """Reason that stops a search that misses a reading most, where no bound is in its way."""
         energies = 3 * self.lobes
         if reading < energies:
             return dataclasses.replace(self.bounds[0], lobe=reading // 3, reason=UNMET[0])

@@ -198,7 +198,7 @@ class Line:
 
 @dataclass(frozen=True)
 class _Correction:
-    """What a slow model reads more than the one in its place, near a point x: value (R,), and its slopes (R, D)."""
+    """Difference of a slow model from the one in its place, near a point x: value (R,), and its slopes (R, D)."""
 
     x: Array
     value: Array
