@@ -15,10 +15,8 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from velatura import api, kernel
-from velatura.errors import InvalidInput
+from velatura import kernel
 from velatura.exports.request import Export, Request, origin
-from velatura.stack import Varying
 from velatura.stack.spectra import LUMINANCE
 
 Array = NDArray[np.floating]
@@ -61,25 +59,18 @@ def write(request: Request) -> Export:
     """The file, and in notes what it leaves out and how far it is from the plugin `layered`.
 
     Raises:
-        InvalidInput: a texture, which a measurement has no place for.
+        InvalidInput: as `Request.bsdf`.
     """
-    material = request.material
-    varying = [address.name for address, value in material.values() if isinstance(value, Varying)]
-    if varying:
-        raise InvalidInput(f"{varying[0]}: a measurement is of one point, and has no textures")
-    mi = kernel.mitsuba()
-    if not mi.is_rgb or mi.variant().startswith("scalar"):
-        raise InvalidInput(f"bsdf: is written in a vectorised RGB variant, llvm_ad_rgb for one, not in {mi.variant()}")
     with kernel.exclusive:
-        drawn = _Drawn(api.bsdf(material, request.model))
+        drawn = _Drawn(request.bsdf("a measurement"))
         tables = tabulated(drawn)
         # Mitsuba writes and reads a file by its name
         with tempfile.TemporaryDirectory(prefix="velatura-") as folder:
             path = Path(folder, "written.bsdf")
-            description = f"{material.name or 'a layered material'}; {origin()}".encode()
+            description = f"{request.material.name or 'a layered material'}; {origin()}".encode()
             fields = {name: np.ascontiguousarray(each, np.float32) for name, each in tables._asdict().items()}
             with contextlib.redirect_stdout(io.StringIO()):  # it says what it wrote
-                mi.tensor_io.write(
+                drawn.mi.tensor_io.write(
                     str(path),
                     description=np.frombuffer(description, np.uint8),
                     jacobian=np.array([1], np.uint8),

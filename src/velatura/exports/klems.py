@@ -16,10 +16,8 @@ from xml.sax.saxutils import escape
 import numpy as np
 from numpy.typing import NDArray
 
-from velatura import api, kernel
-from velatura.errors import InvalidInput
+from velatura import kernel
 from velatura.exports.request import Export, Request, origin
-from velatura.stack import Varying
 from velatura.stack.spectra import LUMINANCE
 
 Array = NDArray[np.floating]
@@ -60,21 +58,16 @@ def write(request: Request) -> Export:
     """Matrices of light from the front and from the back, reflected and passed.
 
     Raises:
-        InvalidInput: a texture, which a matrix has no place for.
+        InvalidInput: as `Request.bsdf`.
     """
-    material = request.material
-    varying = [address.name for address, value in material.values() if isinstance(value, Varying)]
-    if varying:
-        raise InvalidInput(f"{varying[0]}: a matrix is of one point, and has no textures")
-    mi = kernel.mitsuba()
     with kernel.exclusive:
-        bsdf = api.bsdf(material, request.model)
+        bsdf, mi = request.bsdf("a matrix"), kernel.mitsuba()
         both = bool(mi.has_flag(bsdf.flags(), mi.BSDFFlags.BackSide))
         blocks = {}
         for side, name in ((1, "Front"), (-1, "Back")):
             passed, reflected = sides(bsdf, side) if both or side > 0 else np.zeros((2, PATCHES, PATCHES))
             blocks[f"Transmission {name}"], blocks[f"Reflection {name}"] = passed, reflected
-    return Export(_text(material.name or "layered material", blocks))
+    return Export(_text(request.material.name or "layered material", blocks))
 
 
 def sides(bsdf: Any, side: int) -> tuple[Array, Array]:

@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from velatura import files
+from velatura.errors import InvalidInput
 from velatura.version import __version__
 
 if TYPE_CHECKING:
@@ -43,6 +44,24 @@ class Request:
         if list(asked) != ["all"]:
             return asked
         return [name for name, value in self.material.flat().items() if not isinstance(value, Varying)]
+
+    def bsdf(self, what: str) -> Any:
+        """The plugin's BSDF of the material, which `what`, "a matrix", tabulates at one point.
+
+        Raises:
+            InvalidInput: a texture, or a variant other than those of RGB over arrays.
+        """
+        from velatura import api, kernel
+        from velatura.stack import Varying
+
+        varying = [address.name for address, value in self.material.values() if isinstance(value, Varying)]
+        if varying:
+            raise InvalidInput(f"{varying[0]}: {what} is of one point, and has no textures")
+        mi = kernel.mitsuba()
+        if not mi.is_rgb or mi.variant().startswith("scalar"):
+            rule = "is written in a vectorised RGB variant, llvm_ad_rgb for one"
+            raise InvalidInput(f"{self.to}: {rule}, not in {mi.variant()}")
+        return api.bsdf(self.material, self.model)
 
 
 @dataclass(frozen=True)
