@@ -289,3 +289,17 @@ def test_stacks_by_their_difference_at_grazing_angles(run: Run, folder: Path) ->
     assert apart == sorted(apart)
     assert run("explore", "pair.yaml", "--count", "2", "--sheet", "--size", "16", "--spp", "1")[0] == 0
     assert (folder / "pair-sheet.png").read_bytes().startswith(b"\x89PNG")
+
+
+def test_a_way_out_is_taken_by_its_number(run: Run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Expected: JSON lists the ways; one is taken, and its stack written; without that number the refusal stays."""
+    monkeypatch.chdir(tmp_path)
+    Path("bright.yaml").write_text("lobes:\n  - {energy: 0.5, alpha: 0.1}\n")
+    arguments = ("invert", "bright.yaml", "--model", "bati2021")
+    status, out, _ = run(*arguments, "--json")
+    words = [way["words"] for way in json.loads(out)["ways"]]
+    assert status == 3 and words[0].startswith("lobe 1 energy 0.35")
+    status, out, err = run(*arguments, "--way", "1", "-o", "stack.yaml")
+    assert (status, err) == (0, "") and f"Taken in its place: {words[0]}." in out
+    assert vt.load("stack.yaml").interfaces[0].eta == pytest.approx(4, abs=1e-3)
+    assert run(*arguments, "--way", "9")[0] == 3
