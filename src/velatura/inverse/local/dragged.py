@@ -25,7 +25,7 @@ from velatura.inverse.local.coordinates import (
     plain,
     retinted,
 )
-from velatura.inverse.local.newton import Compromise, Problem, Solution
+from velatura.inverse.local.newton import Compromise, Problem
 from velatura.inverse.reasons import UNMET
 from velatura.model import Model
 from velatura.model.registry import stack_lobes
@@ -235,15 +235,15 @@ class DraggedStack:
         found = self.solved(problem) if giving else problem.solve(effort=effort)
         if isinstance(found, Bound):
             return found
-        met = dataclasses.replace(self, point=found.point, target=wish)
+        met = dataclasses.replace(self, point=found, target=wish)
         counted = self.space.counted
         for aside in () if not self.space.slow or not effort else ASIDE:
             beside = None if met.missed(wish, counted) < SAME else met._beside(aside)
             if beside is None:
                 break
             other = Problem(beside.point, problem.goal).solve()
-            if isinstance(other, Solution):
-                tried = dataclasses.replace(beside, point=other.point, target=wish)
+            if isinstance(other, Point):
+                tried = dataclasses.replace(beside, point=other, target=wish)
                 met = min(met, tried, key=lambda stack: stack.missed(wish, counted))
         return met
 
@@ -323,14 +323,14 @@ class DraggedStack:
         possible = passes * np.mean(own / passes)
         return wish if np.max(np.abs(possible - own)) < SLACK else wish.with_lobe(0, energy=tuple(possible.tolist()))
 
-    def solved(self, problem: Problem, held: Sequence[int] = ()) -> Solution | Bound:
+    def solved(self, problem: Problem, held: Sequence[int] = ()) -> Point | Bound:
         """The stack that meets the goal; at a bound, kept coordinates change if they can."""
         found = problem.solve()
-        if isinstance(found, Solution) or found.reason in UNMET:
+        if isinstance(found, Point) or found.reason in UNMET:
             return found
         for coordinate in self._giving(found, held):
             other = problem.solve(Compromise(found, coordinate))
-            if isinstance(other, Solution):
+            if isinstance(other, Point):
                 return other
         return found
 

@@ -9,9 +9,9 @@ import numpy as np
 
 from velatura.inverse.lobes.interface import CONDUCTOR_MAX, ENERGY_MIN
 from velatura.inverse.lobes.partial_stack import Array
-from velatura.inverse.local.coordinates import REFLECTANCE_MAX, Bound, retinted
+from velatura.inverse.local.coordinates import REFLECTANCE_MAX, Bound, Point, retinted
 from velatura.inverse.local.dragged import DraggedStack, with_depth
-from velatura.inverse.local.newton import Compromise, Problem, Solution
+from velatura.inverse.local.newton import Compromise, Problem
 from velatura.optics import fresnel
 
 STEPS = (1.0, 0.5, 0.25, 0.125)  # shares of the way to a member, of which each is tried in turn
@@ -50,17 +50,16 @@ def _moved(stack: DraggedStack, k: int, point: Array, depths: Mapping[int, Array
     if level is not None:
         # Hold the index of the last dielectric, while what absorbs above it gives way, or is clear
         found = problem.solve(level)
-        if isinstance(found, Solution):
-            return dataclasses.replace(moved, point=found.point)
+        if isinstance(found, Point):
+            return dataclasses.replace(moved, point=found)
         if found.reason != "absorption":
             return found
-        assert level.coordinate is not None
         x = moved.point.x.copy()
         x[level.coordinate] = 0.0
         moved = moved.at(x)
         problem, held = Problem(moved.point, problem.goal), [*held, level.coordinate]
     met = moved.solved(problem, held)
-    return dataclasses.replace(moved, point=met.point) if isinstance(met, Solution) else met
+    return dataclasses.replace(moved, point=met) if isinstance(met, Point) else met
 
 
 def _deepened(stack: DraggedStack, k: int, depths: Mapping[int, Array]) -> DraggedStack:

@@ -29,23 +29,10 @@ NEARER, SLOW_PATIENCE = 0.8, 5  # share of what was missing that is nearer, and 
 
 @dataclass(frozen=True)
 class Compromise:
-    """A bound that the solution lies on, and what changes in return: a kept coordinate, or (None) the goal."""
+    """A bound that the solution lies on, and the kept coordinate that changes in return."""
 
     bound: Bound
-    coordinate: int | None = None
-
-    @property
-    def of_goal(self) -> bool:
-        """Whether only a part of the way to the goal is sought, as far as the bound allows."""
-        return self.coordinate is None
-
-
-@dataclass(frozen=True)
-class Solution:
-    """A point, and the part of the way to the goal at which it lies."""
-
-    point: Point
-    part: float
+    coordinate: int
 
 
 @dataclass
@@ -70,7 +57,7 @@ class Problem:
     start: Point
     goal: Array
 
-    def solve(self, compromise: Compromise | None = None, effort: int = 1) -> Solution | Bound:
+    def solve(self, compromise: Compromise | None = None, effort: int = 1) -> Point | Bound:
         """The stack that meets the goal; the violated bound if there is none.
 
         effort: 0 for no differences of a slow model, 1 for some where the search ends near the goal, 2 for more.
@@ -80,7 +67,7 @@ class Problem:
         """
         if effort > 1 and self.start.space.winds and not self.start.space.folded:
             met = Problem(self.start.refolded, self.goal).solve(compromise, effort)
-            return replace(met, point=met.point.refolded) if isinstance(met, Solution) else met
+            return met.refolded if isinstance(met, Point) else met
         nearest = Nearest()
         found = self._searched(compromise, nearest)
         space = self.start.space
@@ -96,23 +83,23 @@ class Problem:
                     self._approach(nearest, readings * len(space.free), giving=effort > 1)
             enough = WINDING if space.winds else JUMP if found.reason in UNMET else ALMOST
             if nearest.missing < enough and not space.broken(nearest.x, None):
-                return Solution(Point(space, nearest.x), 1.0)
+                return Point(space, nearest.x)
         return replace(found, missing=nearest.missing) if isinstance(found, Bound) else found
 
-    def _searched(self, compromise: Compromise | None, nearest: Nearest) -> Solution | Bound:
+    def _searched(self, compromise: Compromise | None, nearest: Nearest) -> Point | Bound:
         """The same by Newton's method with the slopes of `Space.reading`; also keeps the nearest point."""
         space, bound = self.start.space, compromise.bound if compromise else None
         closed = not space.slow
         enough = ENOUGH if bound and closed else ALMOST if closed else SLOW_ALMOST
-        free = space.free if compromise is None or compromise.of_goal else np.r_[space.free, compromise.coordinate]
-        x, part, before = self.start.x, 0.0 if compromise and compromise.of_goal else 1.0, None
+        free = space.free if compromise is None else np.r_[space.free, compromise.coordinate]
+        x, before = self.start.x, None
         blocked, least, waited = dict[int, int](), np.inf, 0
         for n in range(ROUNDS if closed else SLOW_ROUNDS):
             # See what is missing, and how that changes
             known = n == 0 and bound is None
             reading = self.start.reading if known else space.reading(x, free, before)
             before = x, reading
-            missing, slopes = self._equations(compromise, reading, part, x, free)
+            missing, slopes = self._equations(compromise, reading, x, free)
             if not (np.all(np.isfinite(slopes)) and np.all(np.isfinite(missing))):
                 break
             nearest.keep(x, missing[: len(space.free)])
@@ -125,16 +112,16 @@ class Problem:
 
             # Move, within bounds
             moved: Array = np.asarray(np.linalg.lstsq(slopes, -missing, rcond=1e-12)[0], float)
-            full, full_part = x.copy(), part + float(np.sum(moved[len(free) :]))
-            full[free] += self._within_reach(moved[: len(free)], x, free)
-            x, part = space.clipped(full), min(max(full_part, 0.0), 1.0)
+            full = x.copy()
+            full[free] += self._within_reach(moved, x, free)
+            x = space.clipped(full)
             outside = {int(c) for c in free if abs(full[c] - x[c]) > SLACK}
 
             # End where nothing is missing, or where a coordinate keeps meeting its bound
             met = n > 0 and np.max(np.abs(missing)) < enough
-            if met and not outside and abs(full_part - part) <= SLACK:
-                found = Reading(self._on_the_way(part), reading.slopes[:, : len(space.free)])
-                return space.broken(x, bound) or Solution(Point(space, x, found), part)
+            if met and not outside:
+                found = Reading(self.goal, reading.slopes[:, : len(space.free)])
+                return space.broken(x, bound) or Point(space, x, found)
             blocked = {c: blocked.get(c, 0) + 1 for c in outside}
             if held := [c for c, times in blocked.items() if times > (1 if closed else PATIENCE)]:
                 return space.bound_at(min(held), full)
@@ -181,32 +168,16 @@ class Problem:
         worst = int(space.free[nearest.worst])
         return [b for b in space.bounds if b.coordinate == worst and len(x) and abs(x[worst] - b.at) <= SLACK]
 
-    @cached_property
-    def way(self) -> Array:
-        """The way to the goal, in units of the goal."""
-        return self._scaled(self.goal - self.start.reading.value)
+    def _equations(self, compromise: Compromise | None, reading: Reading, x: Array, free: Array) -> tuple[Array, Array]:
+        """The shortfall of a reading from the goal, and its slopes.
 
-    def _equations(
-        self, compromise: Compromise | None, reading: Reading, part: float, x: Array, free: Array
-    ) -> tuple[Array, Array]:
-        """The shortfall of a reading from a part of the way, and its slopes.
-
-        In a compromise one equation more, that the point lies on a bound, and one more unknown if the goal gives way.
+        In a compromise one equation more, that the point lies on a bound.
         """
-        missing, slopes = self._scaled(reading.value - self._on_the_way(part)), self._scaled(reading.slopes)
+        missing, slopes = self._scaled(reading.value - self.goal), self._scaled(reading.slopes)
         if compromise is None:
             return missing, slopes
         margin, change = self.start.space.margin_slopes(compromise.bound, x, free)
-        if compromise.of_goal:
-            slopes, change = np.c_[slopes, -self.way], np.r_[change, 0.0]
         return np.r_[missing, margin], np.vstack([slopes, change])
-
-    def _on_the_way(self, part: float) -> Array:
-        """The reading after a part of the way."""
-        if part == 1:
-            return self.goal
-        here = self.start.reading.value
-        return here + part * (self.goal - here)
 
     def _scaled(self, x: Array) -> Array:
         """The readings, or their slopes, that count, in units of the goal."""
