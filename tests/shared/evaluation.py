@@ -5,10 +5,10 @@ from __future__ import annotations
 import functools
 import operator
 from collections.abc import Callable, Mapping, Sequence
-from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
+from sampled import Sampled
 
 from velatura import ops, tables
 from velatura.ops import Value
@@ -81,7 +81,7 @@ def _evaluated(symbol: Symbol, args: list[Any], values: Mapping[str, Any]) -> An
         channels = ops.interpolate(getattr(tables.load(), symbol.detail), *args)
         return channels if symbol.op == "texels" else channels[0]
     if symbol.op == "film":
-        table = SimpleNamespace(data=values["vt_films"][symbol.detail])
+        table = Sampled(values["vt_films"][symbol.detail])
         return np.stack([np.ravel(x) for x in ops.interpolate(table, *args)])
     if symbol.op == "baked":
         return values["vt_baked"](symbol.detail, args)
