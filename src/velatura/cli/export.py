@@ -62,7 +62,7 @@ def export(
     ] = None,
     settings: options.Settings = None,
 ) -> None:
-    """Write a material as code, a scene, a measurement, or parameters."""
+    """Write a material as a file of another program."""
     if output is None and not FORMATS[to.value].is_text:
         raise InvalidInput(f"--to {to.value}: is no text; name its file with -o")
     if output is not None:

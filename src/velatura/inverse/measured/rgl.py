@@ -13,7 +13,7 @@ from velatura import kernel
 from velatura.errors import InvalidInput
 from velatura.inverse.fitting.angles import AZIMUTHS, Directions, ReflectanceTable
 from velatura.inverse.lobes.partial_stack import Array
-from velatura.inverse.measured import tensors
+from velatura.inverse.measured import rows, tensors
 from velatura.stack import spectra
 
 ROUND = 1e-3  # share of the brightest value by which a measurement may depend on its azimuth, and be isotropic
@@ -78,8 +78,8 @@ def _check(path: Path, arrays: tensors.Arrays) -> None:
     """Refuse arrays with memory unset, or whose nodes are none.
 
     Raises:
-        InvalidInput: numbers that are not finite, grids without an inside, an isotropic sample that depends on its
-            azimuth.
+        InvalidInput: numbers that are not finite, or too large, grids without an inside, an isotropic sample
+            that depends on its azimuth.
     """
     missing = [name for name in ("theta_i", "phi_i") if name not in arrays]
     if missing:
@@ -90,6 +90,9 @@ def _check(path: Path, arrays: tensors.Arrays) -> None:
     ) and all((np.diff(arrays[name]) > 0).all() for name in ("theta_i", "phi_i", "wavelengths") if name in arrays)
     if not usable:
         raise InvalidInput(f"{path}: holds values that are no finite numbers, or no grids of them")
+    for name in ("rgb", "spectra"):
+        if name in arrays and np.abs(arrays[name]).max() > rows.BRIGHTEST:
+            raise InvalidInput(f"{path}: {name}: must lie in -{rows.BRIGHTEST:g} to {rows.BRIGHTEST:g}")
     # Mitsuba takes up to two azimuths for an isotropic sample, and then mirrors directions or not by a number not set
     if len(arrays["phi_i"]) == 2:
         for name in ("vndf", "luminance", "rgb", "spectra"):
