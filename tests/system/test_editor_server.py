@@ -42,6 +42,7 @@ COAT: dict[str, Any] = {
     "name": "Coat",
     "layers": [{"interface": {"eta": 1.5, "alpha": 0.1}}, {"interface": {"conductor": "Au"}}],
 }
+DEEP: list[Any] = json.loads("[" * 21 + "1" + "]" * 21)  # below the four levels of a material of one layer
 
 
 @pytest.fixture
@@ -218,11 +219,7 @@ NAN, INFINITY = float("nan"), float("inf")
         ("read", {"text": "x" * 2**19}, "text: may have 262144 characters at most, got 524288"),
         ("open", {"file": "x" * 300 + ".yaml"}, "file: may have 255 characters at most"),
         ("open", {"file": "\udc80.yaml"}, "must be the plain name of a file"),
-        (
-            "write",
-            {"material": {"layers": [{"interface": {"eta": [[[[[[[[[[[[[[[1]]]]]]]]]]]]]]]}}]}},
-            "16 deep at most",
-        ),
+        ("write", {"material": {"layers": [{"interface": {"eta": DEEP}}]}}, "24 deep at most"),
     ],
 )
 def test_no_body_is_a_failure_of_the_editor(port: int, verb: str, body: dict[str, Any], says: str) -> None:
