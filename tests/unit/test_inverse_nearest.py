@@ -9,7 +9,7 @@ import pytest
 
 import velatura as vt
 from velatura.editor import appearance
-from velatura.inverse import Infeasible, Target, invert_stack
+from velatura.inverse import Infeasible, Target, invert, invert_stack
 from velatura.inverse.local.dragged import DraggedStack, seen
 from velatura.inverse.nearest import Nearest, nearest
 from velatura.model import named
@@ -103,3 +103,20 @@ def test_ways_out_bring_what_takes_them() -> None:
     found = appearance.invert({"target": tinted["target"], "model": "bati2021"})
     assert found["snapped"] is None and "medium" in found["material"]["layers"][0]
     assert found["target"]["lobes"][0]["energy"] == pytest.approx([0.06, 0.03, 0.03], abs=1e-6)
+
+
+@pytest.mark.parametrize(("energy", "alpha"), [(0.7, 0.05), (0.97, 0.2), (1.0, 0.4)])
+def test_a_pair_wished_brighter_and_blurred_at_once_is_refused_for_what_stops_it(energy: float, alpha: float) -> None:
+    """Smooth at first, so that the search begins at a bound of blurs.
+
+    Expected: an index is what ends, since a search among all pairs finds more blur with the energy that is reached, and
+    no more energy with that blur.
+    """
+    pair = Stack([vt.Interface(eta=2.13), vt.Interface(eta=1.54)])
+    wish = Target([{"energy": energy, "alpha": alpha, "interfaces": 2}])
+    found = answer(pair, wish)
+    assert found.reason == "energy"
+    reached = found.reached.lobes[0]
+    for brighter, blurrier, exists in ((1.0, 1.2, True), (1.1, 1.0, False)):
+        lobe = {"energy": brighter * reached.colour[0], "alpha": blurrier * reached.roughness, "interfaces": 2}
+        assert (invert.search(Target([lobe]), AVERAGED) is not None) == exists

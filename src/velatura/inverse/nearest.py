@@ -81,7 +81,7 @@ def nearest(present: DraggedStack, wish: Target, now: Target | None = None, quic
     if bound is not None and (other := _elsewhere(present, possible, quick)) is not None:
         found, bound, part = other, None, 1.0
     if bound is not None and not present.space.slow:
-        found, part = _further(present, now, possible, found, part)
+        found, bound, part = _further(present, now, possible, found, bound, part)
     if bound is not None and (dimmer := _dimmed(present, now, possible, bound, quick)) is not None:
         found, part = dimmer, 1.0
     if bound is None and not quick:
@@ -154,21 +154,24 @@ def _along(start: DraggedStack, now: Target, wish: Target, quick: bool) -> tuple
 
 
 def _further(
-    present: DraggedStack, now: Target, wish: Target, found: DraggedStack, part: float
-) -> tuple[DraggedStack, float]:
-    """The stack that other searches find further on the line, by bisection, and the part of the way there."""
+    present: DraggedStack, now: Target, wish: Target, found: DraggedStack, bound: Bound, part: float
+) -> tuple[DraggedStack, Bound, float]:
+    """The stack that other searches find further on the line, by bisection, the bound there, and the part of the way.
+
+    The first search may have ended beside the line: its bound counts only where nothing is looked for from its end.
+    """
     here, goal = _readings(present, now, now), _readings(present, now, wish)
     end = 1.0
     for _ in range(HALVINGS):
         middle = (part + end) / 2
         asked = present.space.target_of(here + middle * (goal - here), wish)
-        stack, bound, _ = _along(found, found.now(asked), asked, False)
-        other = stack if bound is None else _elsewhere(present, asked, False)
-        if other is None:
-            end = middle
-        else:
+        stack, stopped, _ = _along(found, found.now(asked), asked, False)
+        other = stack if stopped is None else _elsewhere(present, asked, False)
+        if other is not None:
             found, part = other, middle
-    return found.renamed(wish), part
+        elif stopped is not None:
+            end, bound = middle, stopped
+    return found.renamed(wish), bound, part
 
 
 def _readings(start: DraggedStack, now: Target, wish: Target) -> np.ndarray:
