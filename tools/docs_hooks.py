@@ -27,6 +27,7 @@ import shutil
 import subprocess
 import sys
 from functools import cache
+from importlib import import_module
 from math import floor, log10
 from pathlib import Path
 from typing import Any
@@ -82,6 +83,7 @@ def setup(app: Any) -> dict[str, bool]:
     app.connect("source-read", _on_source_read)
     app.connect("autodoc-process-signature", _on_signature)
     app.connect("autodoc-process-docstring", _on_docstring)
+    app.add_lexer("csv", import_module("pygments.lexers.special").TextLexer)  # Pygments has none of its own
     return {"parallel_read_safe": True, "parallel_write_safe": True}
 
 
