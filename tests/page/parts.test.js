@@ -28,7 +28,7 @@ const idOf = (state, name) => {
   return found(state.parts).find((node) => node.name === name).id;
 };
 
-test('a mixture, and one within it, is written as it was read, whatever part is chosen', () => {
+test('a mixture, and one within it, is written as it was read, for any chosen part', () => {
   for (const material of [PAIR, NESTED, { ...PAIR, mix: PAIR.mix.map((part) => ({ ...part, material: { ...part.material, exterior: 1.33 } })) }]) {
     const state = opened(material);
     assert.deepEqual(documentOf(state), { ...material });

@@ -5,8 +5,7 @@ import { addFilm, moveFilm, numberOf, removeFilm, setFilm } from '../state/comma
 import { stackOf } from '../state/material.js';
 import { hex } from './colour.js';
 import { iconButton, styles } from './controls.js';
-import { icons } from './icons.js';
-import { followGrip } from './moving.js';
+import { grip } from './moving.js';
 
 const FRESH = { eta: 2, thickness_nm: 250 }; // of a new film: one that is seen on glass and on metal
 const SPANS = [1000, 5000]; // nanometres, where sliders end
@@ -57,28 +56,12 @@ function card({ services, layer, value, film, n, row, spec }) {
   };
   return html`<li class="film" data-film=${n} aria-label=${name}>
     <div class="head">
-      <button
-        type="button"
-        class="small grip"
-        title="Drag to move; arrow keys move too"
-        aria-label=${`Move film ${n}: arrow keys`}
-        @keydown=${(event) => byKey(event, (step) => move(n + step))}
-        @pointerdown=${(event) => followGrip(event, '.film', { drop: move })}
-      >
-        ${icons.grip}
-      </button>
+      ${grip({ name: `film ${n}`, place: n, items: '.film', move })}
       <span class="place">${name}</span>
       <span class="buttons">${iconButton({ label: `Remove film ${n}`, icon: 'remove', act: remove })}</span>
     </div>
     ${Object.keys(spec).map(part)}
   </li>`;
-}
-
-function byKey(event, move) {
-  const step = { ArrowUp: -1, ArrowDown: 1 }[event.key];
-  if (!step) return;
-  event.preventDefault();
-  move(step);
 }
 
 /** What the interface reflects at the normal over the thickness of a film, the brightest of it as white; a click picks. */

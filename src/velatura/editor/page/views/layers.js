@@ -18,7 +18,7 @@ import {
 import { enabled, isBase, layerName, variantOf } from '../state/material.js';
 import { capital, flag, iconButton, menu, numberField } from './controls.js';
 import { icons } from './icons.js';
-import { followGrip } from './moving.js';
+import { grip } from './moving.js';
 import { parameter, parametersOf, tintOf } from './parameter.js';
 import { parts } from './parts.js';
 import { text } from './typing.js';
@@ -136,16 +136,7 @@ function card(panel, layer, index) {
     aria-label=${layer.enabled ? `Layer ${number}: ${name}` : `${name}, off`}
   >
     <div class="head">
-      <button
-        type="button"
-        class="small grip"
-        title="Drag to move; arrow keys move too"
-        aria-label=${`Move ${name}: arrow keys`}
-        @keydown=${(event) => moveByKey(panel, event, layer, index)}
-        @pointerdown=${(event) => moveByHand(panel, event, layer)}
-      >
-        ${icons.grip}
-      </button>
+      ${grip({ name, place: index, items: '.layer', ...moving(panel, layer) })}
       <b class="place" title="Its number in plots and messages">${layer.enabled ? number : '–'}</b>
       ${kindOf(panel, layer)}
       <span class="buttons">
@@ -203,23 +194,13 @@ function remove(panel, layer, index) {
 
 // Moving ---------------------------------------------------------------------------------------------
 
-function moveByKey(panel, event, layer, index) {
-  const step = { ArrowUp: -1, ArrowDown: 1 }[event.key];
-  if (!step) return;
-  event.preventDefault();
-  panel.store.run(moveLayer, layer.id, index + step);
-  panel.focus(`[data-layer="${layer.id}"] .grip`);
-}
-
-function moveByHand(panel, event, layer) {
-  followGrip(event, '.layer', {
-    over(index) {
-      panel.dropAt = index;
-      panel.update();
-    },
-    drop(index) {
-      panel.store.run(moveLayer, layer.id, index);
-      panel.focus(`[data-layer="${layer.id}"] .grip`);
-    },
-  });
-}
+const moving = (panel, layer) => ({
+  over(index) {
+    panel.dropAt = index;
+    panel.update();
+  },
+  move(index) {
+    panel.store.run(moveLayer, layer.id, index);
+    panel.focus(`[data-layer="${layer.id}"] .grip`);
+  },
+});

@@ -16,8 +16,7 @@ import {
   sharesOf,
 } from '../state/parts.js';
 import { iconButton, shown } from './controls.js';
-import { icons } from './icons.js';
-import { followGrip } from './moving.js';
+import { grip } from './moving.js';
 import { row } from './parameter.js';
 import { text } from './typing.js';
 
@@ -59,16 +58,7 @@ function card(panel, siblings, node, index) {
   };
   return html`<li class="part ${isChosen ? 'chosen' : ''}" data-part=${node.id} aria-label=${`Part ${index}: ${name}`}>
     <div class="head">
-      <button
-        type="button"
-        class="small grip"
-        title="Drag to move; arrow keys move too"
-        aria-label=${`Move ${name}: arrow keys`}
-        @keydown=${(event) => byKey(event, (step) => move(index + step))}
-        @pointerdown=${(event) => followGrip(event, ':scope > .part', { drop: move })}
-      >
-        ${icons.grip}
-      </button>
+      ${grip({ name, place: index, items: ':scope > .part', move })}
       <b class="place" title="Its number in messages">${index}</b>
       ${
         isChosen || node.parts
@@ -121,11 +111,4 @@ function rest(siblings) {
   return html`<div class="parameter rest" title="The last part covers what the others leave">
     <span class="name">Share</span><span class="extras"></span><span class="control">${words}, the rest</span>
   </div>`;
-}
-
-function byKey(event, move) {
-  const step = { ArrowUp: -1, ArrowDown: 1 }[event.key];
-  if (!step) return;
-  event.preventDefault();
-  move(step);
 }
