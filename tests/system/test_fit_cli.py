@@ -11,6 +11,8 @@ import numpy as np
 import pytest
 
 import velatura as vt
+from velatura import inverse
+from velatura.errors import MissingTool
 from velatura.inverse import Directions, table_of
 from velatura.model import named
 from velatura.stack import Diffuse, Interface, Stack, save
@@ -54,6 +56,20 @@ def test_a_fit_says_what_the_table_determines(run: Run, folder: Path) -> None:
     assert {"trades", "others"} <= report.keys()
     assert report["model_error"]["walks"] == 1000 and "itself beside walks of this stack" in out
     assert "model_error" not in json.loads(run(*arguments, "--json", "--walks", "0")[1])
+
+
+def test_a_fit_is_kept_where_there_is_nothing_to_walk_with(
+    run: Run, folder: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Expected: the material, and one line about the walks."""
+
+    def missing(*_: Any) -> None:
+        raise MissingTool("LLVM is missing")
+
+    monkeypatch.setattr(inverse, "model_error", missing)
+    status, _, err = run("fit", "table.csv", "target.yaml", "--model", "bati2021", "-o", "found.yaml")
+    assert (status, err) == (0, "velatura: no walks: LLVM is missing\n")
+    assert vt.load("found.yaml").interfaces[0].eta == pytest.approx(1.8, rel=1e-4)
 
 
 def test_a_brushed_table_is_read(run: Run, folder: Path) -> None:

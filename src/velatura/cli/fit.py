@@ -3,15 +3,20 @@
 from __future__ import annotations
 
 import json
+import sys
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
 from velatura.cli import invert, options, progress
+from velatura.errors import MissingTool
 
 if TYPE_CHECKING:
     from velatura.inverse import Fit, ModelError, ReflectanceTable
+    from velatura.model import Model
+    from velatura.stack import Described
 
 Output = Annotated[Path | None, typer.Option("--output", "-o", metavar="F", help="The material (YAML or JSON).")]
 
@@ -63,10 +68,21 @@ def fit(
     picture = invert.picture(table) if plot else None
     with progress.clock(f"Fitting {Path(table).name}"):
         found = inverse.fit_target(rows, wanted, starts, name, seed, **switches)
-        own = inverse.model_error(found, rows.directions, walks, seed) if walks else None
+        own = _beside_walks(found, rows, walks, seed) if walks else None
     if picture:
         draw(rows, found, wanted.name or Path(table).name, picture)
     show(found, output, picture, as_json, own)
+
+
+def _beside_walks(found: Fit, rows: ReflectanceTable, walks: int, seed: int) -> ModelError | None:
+    """The error of the model itself; None where there is nothing to walk with, so that the fit is kept."""
+    from velatura import inverse
+
+    try:
+        return inverse.model_error(found, rows.directions, walks, seed)
+    except MissingTool as error:
+        print(f"velatura: no walks: {error}", file=sys.stderr)
+        return None
 
 
 def check(output: Path | None) -> None:
@@ -79,7 +95,7 @@ def check(output: Path | None) -> None:
 
 def show(found: Fit, output: Path | None, picture: Path | None, as_json: bool, own: ModelError | None = None) -> None:
     """Write the material, and print it with its error, that of the model itself, and the name of a picture of it."""
-    from velatura.stack import dumps, save
+    from velatura.stack import save
 
     if output:
         save(found.stack, output)
@@ -88,9 +104,16 @@ def show(found: Fit, output: Path | None, picture: Path | None, as_json: bool, o
         print(json.dumps({"model": found.model.name, **found.to_dict(), **walked}, allow_nan=False))
         return
     report(found, own)
-    invert.say_for_which(found.model)
-    print(output if output else dumps(found.stack, "yaml"), end="\n" if output else "")
-    if picture:
+    conclude(found.model, found.stack, output, [picture] if picture else [])
+
+
+def conclude(model: Model, material: Described, output: Path | None, pictures: Sequence[Path]) -> None:
+    """Print for which model a material holds, the file that it was written to or itself, and its pictures."""
+    from velatura.stack import dumps
+
+    invert.say_for_which(model)
+    print(output if output else dumps(material, "yaml"), end="\n" if output else "")
+    for picture in pictures:
         print(picture)
 
 

@@ -55,7 +55,7 @@ def simplify(
 
 def _show(found: MixtureFit, output: Path | None, pictures: list[Path], as_json: bool) -> None:
     """Write the mixture, and print it with the errors of its parts."""
-    from velatura.stack import dumps, save
+    from velatura.stack import save
 
     if output:
         save(found.material, output)
@@ -65,7 +65,4 @@ def _show(found: MixtureFit, output: Path | None, pictures: list[Path], as_json:
     for part, each in found.parts.items():
         print(f"{part}:")
         fit.report(each)
-    invert.say_for_which(found.model)
-    print(output if output else dumps(found.material, "yaml"), end="\n" if output else "")
-    for picture in pictures:
-        print(picture)
+    fit.conclude(found.model, found.material, output, pictures)
