@@ -86,7 +86,7 @@ EVERYTHING_OPEN = """localStorage['velatura.layout'] ??=
   JSON.stringify({ form: 1, value: { look: true, view: true, model: true } })"""
 
 
-# Previews alone are drawn, from the first one on: whatever begins to trace paths compiles their programs
+# Previews alone are drawn, from the first one on: a page that traces paths compiles their programs
 PREVIEWS_ALONE = """Object.defineProperty(window, 'velatura', {
   configurable: true,
   set(app) {

@@ -8,11 +8,11 @@ from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
-from sampled import Sampled
 
 from velatura import ops, tables
 from velatura.ops import Value
 from velatura.shader.recorder.symbol import Operand, Symbol, in_order, inside, operand
+from velatura.tables.store import Table
 
 _ARITHMETIC: dict[str, Callable[..., Any]] = {
     "add": operator.add,
@@ -81,7 +81,7 @@ def _evaluated(symbol: Symbol, args: list[Any], values: Mapping[str, Any]) -> An
         channels = ops.interpolate(getattr(tables.load(), symbol.detail), *args)
         return channels if symbol.op == "texels" else channels[0]
     if symbol.op == "film":
-        table = Sampled(values["vt_films"][symbol.detail])
+        table = Table(values["vt_films"][symbol.detail])
         return np.stack([np.ravel(x) for x in ops.interpolate(table, *args)])
     if symbol.op == "baked":
         return values["vt_baked"](symbol.detail, args)

@@ -8,7 +8,6 @@ from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
-from sampled import Sampled
 
 from velatura import ops
 from velatura.shader import Printer
@@ -20,6 +19,7 @@ from velatura.shader.printers.printer import ATOM, Member, Output, Struct
 from velatura.shader.printers.statements import assignments, statements
 from velatura.shader.recorder.cost import Cost
 from velatura.shader.recorder.symbol import Kind, Operand, Symbol
+from velatura.tables.store import Table
 
 _COMPARE = {"less": "<", "greater": ">", "at_most": "<=", "at_least": ">="}
 _ELEMENTS = {"x": 0, "y": 1, "z": 2, "r": 0}
@@ -266,13 +266,13 @@ def _looked_up(texture: np.ndarray, start: int, nodes: tuple[int, ...], channels
     """All channels of a table, found in the texture where its layout says."""
     width = channels if channels == 1 else -(-channels // 4) * 4
     data = texture.reshape(-1)[4 * start :][: int(np.prod(nodes)) * width].reshape(*nodes, width)
-    return ops.interpolate(Sampled(data), *place)
+    return ops.interpolate(Table(data), *place)
 
 
 def _filmed(texture: np.ndarray, start: int, nodes: tuple[int, ...], place: Sequence[Any]) -> np.ndarray:
     """A table of films, found in their texture where its layout says."""
     data = texture.reshape(-1, 4)[start:][: int(np.prod(nodes)), :3].reshape(*nodes, 3)
-    return _colour(*ops.interpolate(Sampled(data), *place))
+    return _colour(*ops.interpolate(Table(data), *place))
 
 
 def _read(texture: np.ndarray, nodes: tuple[int, ...], sides: int, group: tuple[int, int], place: Sequence[Any]) -> Any:
@@ -281,5 +281,5 @@ def _read(texture: np.ndarray, nodes: tuple[int, ...], sides: int, group: tuple[
     lines = texture.reshape(-1, sides, *nodes[::-1], 4)[begin : begin + count]
     data = np.moveaxis(lines, (0, -2), (-2, 1))  # side, cosine, azimuth, texel, channel
     at = (x, y)[: len(nodes)]
-    seen = [ops.interpolate(Sampled(one.reshape(*nodes, -1)), *at) for one in data]
+    seen = [ops.interpolate(Table(one.reshape(*nodes, -1)), *at) for one in data]
     return seen[0] if sides == 1 else [np.where(np.asarray(side) > 0.5, below, above) for above, below in zip(*seen)]

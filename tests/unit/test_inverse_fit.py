@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 from benchmarks import benchmark
-from fuzzing.imports import tensors
+from fuzzing.imports import rgl, tensors
 
 from velatura.errors import InvalidInput
 from velatura.inverse import (
@@ -392,17 +392,8 @@ def _polar(theta: Any, phi: Any) -> np.ndarray:
 def test_an_rgl_file(tmp_path: Path) -> None:
     """As Dupuy & Jakob 2018 have them: with a constant NDF D and projected area s, f cos is rgb D / (4 s)."""
     path, single = tmp_path / "paint_rgb.bsdf", np.float32
-    fields: dict[str, Any] = {
-        "description": np.frombuffer(b"constant", np.uint8),
-        "jacobian": np.array([1], np.uint8),
-        "theta_i": np.array([0, 0.8, 1.5], single),
-        "phi_i": np.zeros(1, single),
-        "ndf": np.full((4, 4), 0.5, single),
-        "sigma": np.full((4, 4), 0.25, single),
-        "vndf": np.ones((1, 3, 4, 4), single),
-        "luminance": np.ones((1, 3, 4, 4), single),
-        "rgb": np.tile(np.array([0.2, 0.4, 0.6], single)[:, None, None], (1, 3, 1, 4, 4)),
-    }
+    colour = np.tile(np.array([0.2, 0.4, 0.6])[:, None, None], (1, 3, 1, 4, 4))
+    fields: dict[str, Any] = rgl(np.full((4, 4), 0.5), np.full((4, 4), 0.25), rgb=colour)
     path.write_bytes(tensors(fields))
     table = load_table(path)
     assert not table.directions.brushed

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from fuzzing.imports import tensors
+from fuzzing.imports import rgl, tensors
 
 from velatura import kernel
 from velatura.errors import InvalidInput
@@ -216,19 +216,10 @@ def test_a_polarised_measurement(tmp_path: Path) -> None:
 
 def test_spectra_of_rgl(tmp_path: Path) -> None:
     """With a constant NDF D and projected area s, f cos is the spectrum D / (4 s), in the colour by Mitsuba."""
-    path, single = tmp_path / "paint_spec.bsdf", np.float32
-    fields: dict[str, Any] = {
-        "description": np.frombuffer(b"constant", np.uint8),
-        "jacobian": np.array([1], np.uint8),
-        "theta_i": np.array([0, 0.8, 1.5], single),
-        "phi_i": np.zeros(1, single),
-        "ndf": np.full((4, 4), 0.5, single),
-        "sigma": np.full((4, 4), 0.25, single),
-        "vndf": np.ones((1, 3, 4, 4), single),
-        "luminance": np.ones((1, 3, 4, 4), single),
-        "wavelengths": np.array(WAVELENGTHS, single),
-        "spectra": np.tile(np.array(REFLECTED, single)[:, None, None], (1, 3, 1, 4, 4)),
-    }
+    path = tmp_path / "paint_spec.bsdf"
+    spectra = np.tile(np.array(REFLECTED)[:, None, None], (1, 3, 1, 4, 4))
+    grids = np.full((4, 4), 0.5), np.full((4, 4), 0.25)
+    fields = rgl(*grids, wavelengths=np.array(WAVELENGTHS), spectra=spectra)
     path.write_bytes(tensors(fields))
     table = load_table(path)
     assert not table.directions.brushed

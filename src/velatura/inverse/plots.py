@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from velatura.errors import needs
-from velatura.inverse.fitting.angles import ReflectanceTable, grouped, table_of
+from velatura.inverse.fitting.angles import ReflectanceTable, evenly, grouped, table_of
 from velatura.inverse.fitting.descent import Fit
 
 if TYPE_CHECKING:  # a class draws itself
@@ -182,7 +182,7 @@ def draw_fit(figure: Any, table: ReflectanceTable, found: Fit, title: str) -> No
     fitted = table_of(found.stack, table.directions, found.model).value * cosine
     tilt = table.directions.tilt
     different = np.unique(theta_i)
-    shown = different[np.unique(np.linspace(0, len(different) - 1, min(len(different), PANELS)).astype(int))]
+    shown = different[evenly(len(different), PANELS)]
     above, below = figure.subfigures(2, 1, height_ratios=(3, 2))
     for n, angle in enumerate(shown):
         own = theta_i == angle

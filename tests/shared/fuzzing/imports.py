@@ -14,7 +14,7 @@ import struct
 import tempfile
 import time
 import warnings
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from importlib import import_module
 from pathlib import Path
 from typing import Any
@@ -271,36 +271,30 @@ def _merl(rng: np.random.Generator) -> Files:
 
 
 def _rgl(rng: np.random.Generator) -> Files:
-    single, n = np.float32, int(rng.choice([1, 2, 4]))
-    fields: dict[str, np.ndarray] = {
-        "description": np.frombuffer(b"made", np.uint8),
-        "jacobian": np.array([1], np.uint8),
-        "theta_i": np.array([0, 0.8, 1.5], single),
-        "phi_i": np.linspace(0, 6, n).astype(single),
-        "ndf": rng.uniform(0.1, 1, (4, 4)).astype(single),
-        "sigma": rng.uniform(0.1, 1, (4, 4)).astype(single),
-        "vndf": np.ones((n, 3, 4, 4), single),
-        "luminance": np.ones((n, 3, 4, 4), single),
-        "rgb": rng.uniform(0, 1, (n, 3, 3, 4, 4)).astype(single),
-    }
-    return {"a.bsdf": tensors(fields)}
+    n = int(rng.choice([1, 2, 4]))
+    grids = rng.uniform(0.1, 1, (4, 4)), rng.uniform(0.1, 1, (4, 4))
+    return {"a.bsdf": tensors(rgl(*grids, np.linspace(0, 6, n), rgb=rng.uniform(0, 1, (n, 3, 3, 4, 4))))}
 
 
 def _rgl_spectra(rng: np.random.Generator) -> Files:
-    single, n = np.float32, int(rng.integers(1, 5))
-    fields: dict[str, np.ndarray] = {
+    n = int(rng.integers(1, 5))
+    grids = rng.uniform(0.1, 1, (4, 4)), rng.uniform(0.1, 1, (4, 4))
+    colours = {"wavelengths": np.linspace(400, 700, n), "spectra": rng.uniform(0, 1, (1, 3, n, 4, 4))}
+    return {"a.bsdf": tensors(rgl(*grids, **colours))}
+
+
+def rgl(
+    ndf: np.ndarray, sigma: np.ndarray, phi_i: Sequence[float] | np.ndarray = (0.0,), **colours: np.ndarray
+) -> dict[str, np.ndarray]:
+    """Arrays of a measurement of the RGL database (Dupuy & Jakob 2018) at three angles of incidence, without a warp."""
+    even = np.ones((len(phi_i), 3, 4, 4))
+    grids = {"phi_i": phi_i, "ndf": ndf, "sigma": sigma, "vndf": even, "luminance": even, **colours}
+    return {
         "description": np.frombuffer(b"made", np.uint8),
         "jacobian": np.array([1], np.uint8),
-        "theta_i": np.array([0, 0.8, 1.5], single),
-        "phi_i": np.zeros(1, single),
-        "ndf": rng.uniform(0.1, 1, (4, 4)).astype(single),
-        "sigma": rng.uniform(0.1, 1, (4, 4)).astype(single),
-        "vndf": np.ones((1, 3, 4, 4), single),
-        "luminance": np.ones((1, 3, 4, 4), single),
-        "wavelengths": np.linspace(400, 700, n).astype(single),
-        "spectra": rng.uniform(0, 1, (1, 3, n, 4, 4)).astype(single),
+        "theta_i": np.array([0, 0.8, 1.5], np.float32),
+        **{name: np.asarray(grid, np.float32) for name, grid in grids.items()},
     }
-    return {"a.bsdf": tensors(fields)}
 
 
 def _polarised(rng: np.random.Generator) -> Files:

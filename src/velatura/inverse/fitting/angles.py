@@ -205,6 +205,11 @@ def energies(before: ReflectanceTable, after: ReflectanceTable) -> list[dict[str
     return [{"theta_i": angle, "before": one, "after": other} for angle, one, other in rows]
 
 
+def evenly(count: int, most: int) -> NDArray[np.intp]:
+    """Numbers below count: all, or where these are more than `most` evenly many, the first and the last among them."""
+    return np.unique(np.linspace(0, count - 1, min(count, most)).astype(np.intp))
+
+
 def grouped(theta_i: Array) -> Array:
     """Angles of incidence as they are reported: as they are where they are few, else the middles of groups."""
     if len(np.unique(np.round(theta_i, 6))) <= GROUPS:

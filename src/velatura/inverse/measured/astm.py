@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from velatura.errors import InvalidInput
-from velatura.inverse.fitting.angles import Directions, ReflectanceTable
+from velatura.inverse.fitting.angles import Directions, ReflectanceTable, evenly
 from velatura.inverse.measured import rows
 from velatura.stack import spectra
 from velatura.stack.schema import show
@@ -39,7 +39,7 @@ def read(path: Path) -> ReflectanceTable:
     if not numbered:
         raise InvalidInput(f"{path}: holds no directions")
     numbers = np.array([_row(f"{path}: line {n}", cells, columns) for n, cells in numbered])
-    kept = np.unique(np.linspace(0, len(numbers) - 1, min(len(numbers), TAKEN)).astype(int))
+    kept = evenly(len(numbers), TAKEN)
     theta_i, phi_i, theta_s, phi_s = numbers[kept, :4].T
     return ReflectanceTable(Directions.of(theta_i, theta_s, phi_s - phi_i, phi_i), in_rgb @ numbers[kept, 4:].T)
 

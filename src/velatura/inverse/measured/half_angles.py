@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from velatura.errors import InvalidInput
-from velatura.inverse.fitting.angles import Directions, ReflectanceTable
+from velatura.inverse.fitting.angles import Directions, ReflectanceTable, evenly
 from velatura.inverse.lobes.partial_stack import Array
 
 TAKEN = (24, 9, 8)  # of half-vector tilts, differences and azimuths: enough for a stack's few values
@@ -30,10 +30,7 @@ def thinned(
     Raises:
         InvalidInput: none was measured; one line that names the file.
     """
-    some = [
-        np.unique(np.linspace(0, len(axis) - 1, min(len(axis), most)).astype(int))
-        for axis, most in zip((tilt, apart, turn), TAKEN)
-    ]
+    some = [evenly(len(axis), most) for axis, most in zip((tilt, apart, turn), TAKEN)]
     grid = np.meshgrid(*(axis[n] for axis, n in zip((tilt, apart, turn), some)), indexing="ij")
     directions = Directions.about_halves(*(angle.ravel() for angle in grid))
     found = values(*some).reshape(3, -1)

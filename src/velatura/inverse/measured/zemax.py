@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 
 from velatura.errors import InvalidInput
-from velatura.inverse.fitting.angles import Directions, ReflectanceTable
+from velatura.inverse.fitting.angles import Directions, ReflectanceTable, evenly
 from velatura.inverse.lobes.partial_stack import Array
 from velatura.inverse.measured import rows
 from velatura.stack import spectra
@@ -82,7 +82,7 @@ def read(path: Path) -> ReflectanceTable:
     if len(blocks) == 3:
         value = np.tensordot(np.array(spectra.SRGB_FROM_XYZ), value, 1)
 
-    some = [np.unique(np.linspace(0, n - 1, min(n, most)).astype(int)) for n, most in zip(shape, TAKEN)]
+    some = [evenly(n, most) for n, most in zip(shape, TAKEN)]
     rotation, theta_i, azimuth, radial = (
         x.ravel() for x in np.meshgrid(*(axis[n] for axis, n in zip(axes, some)), indexing="ij")
     )
