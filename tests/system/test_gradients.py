@@ -33,6 +33,7 @@ RARER = vt.Stack(  # the last medium is rarer than the outside
     [vt.Interface(eta=1.7, alpha=0.5), vt.Interface(eta=1.37), vt.Interface(conductor="mirror", alpha=0.1)],
     exterior=1.4,
 )
+MATCHED_ROUGH = vt.Stack([vt.Interface(eta=1.0, alpha=0.1), vt.Interface(conductor="mirror", alpha=1.0)])
 ROUND = vt.Stack([vt.Interface(conductor="mirror", alpha=0.2)])
 UP, DOWN = (-0.45, -0.15, 0.75), (-0.45, -0.15, -0.75)
 
@@ -105,26 +106,34 @@ def test_a_gradient_by_the_index_of_the_outside_is_the_slope_towards_denser_medi
     assert float(dr.grad(eta)[0]) == pytest.approx((denser - same) / 0.02, rel=0.05)
 
 
-def test_the_edge_of_light_out_of_a_rarer_medium_moves_with_its_index() -> None:
-    """The gradient of all light that leaves towards a lamp at the horizon, by that index: to 3 %."""
-    bsdf, eta = vt.bsdf(RARER), mi.Float(1.37)
+def lit_at_the_horizon(bsdf: Any) -> Any:
+    """All light that leaves towards a lamp there."""
     u, turn = (mi.Float(x) for x in low_discrepancy.fibonacci(28657))
     wo = mi.warp.square_to_cosine_hemisphere(mi.Point2f(u, turn))
     si = dr.zeros(mi.SurfaceInteraction3f, dr.width(u))
     si.wi = dr.normalize(mi.Vector3f(0.4, 0.3, 0.8))
     lamp = dr.select(wo.z < 0.5, 1 / (wo.z * dr.width(u)), 0)
+    return dr.sum(dr.mean(bsdf.eval(mi.BSDFContext(), si, wo)) * lamp)
 
-    def light(bsdf: Any) -> Any:
-        return dr.sum(dr.mean(bsdf.eval(mi.BSDFContext(), si, wo)) * lamp)
 
+@pytest.mark.parametrize(
+    ("stack", "key", "ends", "off"),
+    ((RARER, "layer1_eta", (0.98, 1.02), {"rel": 0.03}), (MATCHED_ROUGH, "layer0_eta", (1.0, 1.02), {"abs": 0.05})),
+    ids=("rarer", "of the outside"),
+)
+def test_the_edge_of_light_moves_with_its_index(
+    stack: vt.Stack, key: str, ends: tuple[float, float], off: dict[str, Any]
+) -> None:
+    """The gradient of light at the horizon by the index of the medium that it leaves, to 3 %, or .05."""
+    given = float(stack.flat()[key])
+    bsdf, eta = vt.bsdf(stack), mi.Float(given)
     parameters = mi.traverse(bsdf)
     dr.enable_grad(eta)
-    parameters["layer1_eta"] = eta
+    parameters[key] = eta
     parameters.update()
-    dr.backward(light(bsdf))
-    ends = 0.98 * 1.37, 1.02 * 1.37
-    low, high = (float(light(vt.bsdf(RARER.replace(layer1_eta=end)))[0]) for end in ends)
-    assert float(dr.grad(eta)[0]) == pytest.approx((high - low) / (ends[1] - ends[0]), rel=0.03)
+    dr.backward(lit_at_the_horizon(bsdf))
+    low, high = (float(lit_at_the_horizon(vt.bsdf(stack.replace(**{key: end * given})))[0]) for end in ends)
+    assert float(dr.grad(eta)[0]) == pytest.approx((high - low) / ((ends[1] - ends[0]) * given), **off)
 
 
 def test_one_variable_for_both_axes_leaves_an_interface_isotropic(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -42,7 +42,7 @@ from velatura.ops import Value
 from velatura.optics.ggx import Direction
 from velatura.optics.phase import HenyeyGreenstein, PhaseFunction
 from velatura.renderer import directional_grid, finite_differences, low_discrepancy
-from velatura.renderer.differentiated import Variables
+from velatura.renderer.differentiated import RELATIVE, Variables
 from velatura.renderer.differentiated import plain as plain
 from velatura.renderer.directional_grid import Packing
 from velatura.stack import InterfaceValues, Material, SlabValues
@@ -69,7 +69,8 @@ MIN_DEFENSIVE_SHARE = 0.2  # of samples of the symmetric form, that the remainde
 class LobeSpec:
     """A lobe: the number of its interface from the top, that of the one that shapes its light on the way out, None
     where none does, whether it is the veil of one, whether its medium is nowhere of a lower index than outside, and
-    whether its light has an edge for want of that: where what lets it out passes light of any momentum in the medium.
+    whether its light has an edge: for want of that, where what lets it out passes light of any momentum in the medium,
+    or nearly, where the indices are about the same.
     """
 
     interface: int
@@ -700,7 +701,8 @@ def layout_of(materials: Sequence[Material], veiled: Set[int] = frozenset()) -> 
     denser = np.all(above >= 1, axis=0).tolist()
     firsts = [widths.first_step(steps[:k]) for k in range(len(steps))]
     edged = [k is not None and bool(np.any(above[:, k + 1] > own * CLOSE)) for k, own in zip(firsts, above.T)]
-    lobes = [LobeSpec(k, firsts[k], veil, denser[k], edged[k] and not denser[k]) for k, veil in both]
+    near = np.any((1 - RELATIVE) * above < 1, axis=0).tolist()
+    lobes = [LobeSpec(k, firsts[k], veil, denser[k], (near if denser[k] else edged)[k]) for k, veil in both]
     cloudy = sorted(set().union(*map(_cloudy, materials)))
     stepped = widths.stepped(steps)
     last, top = rough[-1] if rough else None, _top(materials, stepped)

@@ -43,7 +43,8 @@ Reflectance = Callable[[Value], Value]
 class MediumIndex:
     """An index n relative to the medium outside, and what lobes take of it: its inverse, and the radius of the ring of
     momenta beyond those that can leave, from 1 to n, in squares and as it is. `denser`: whether n is known to be 1 at
-    least, so that light from any direction gets in. `edged`: whether light of momenta beyond n is cut off."""
+    least, so that light from any direction gets in. `edged`: whether light of momenta beyond n is cut off, or n
+    is so close to 1 that light at the horizon is curved like a root of it."""
 
     n: Value
     inverse: Value
@@ -96,11 +97,14 @@ def eval_pdf(lobe: RefractedLobe, wi: Direction, wo: Direction) -> tuple[Value, 
     ends = ops.around(n.n, RELATIVE) if n.edged else None
     if ends is None:
         return _eval_pdf(lobe, wi, wo)
-    # The edge moves with the index: slopes by it are differences
+    # The edge moves with the index: slopes by it are differences, over the step that those of weights are
+    low, at, high = ends
+    if n.denser:
+        low = ops.select(low < 1, at, low)
     (below, _), (value, density), (above, _) = (
-        _eval_pdf(replace(lobe, n=MediumIndex.of(each)), wi, wo) for each in ends
+        _eval_pdf(replace(lobe, n=MediumIndex.of(each, n.denser)), wi, wo) for each in (low, at, high)
     )
-    return value + (above - below) * ((n.n - ends[1]) / (ends[2] - ends[0])), density
+    return value + (above - below) * ((n.n - at) / (high - low)), density
 
 
 def _eval_pdf(lobe: RefractedLobe, wi: Direction, wo: Direction) -> tuple[Value, Value]:
