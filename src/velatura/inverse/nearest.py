@@ -22,9 +22,9 @@ from velatura.inverse.solution import EFFORTS, in_closed_form
 from velatura.stack import Stack
 
 EFFORT = EFFORTS[:1]  # to find a stack that is not near
-READINGS, QUICK_READINGS = 10, 4  # of a slow model, of one line
+# Readings of a slow model, of one line: at rest and under the hand; and where slopes are measured
+READINGS, LONG_READINGS = (10, 6), (36, 16)
 QUICK = 2e-3  # by which an answer under the hand may miss its place on the line, in units of readings
-SHORTER = (1.0, 0.9)  # shares of the part that is found which are tried where a search does not end on the line
 ON_LINE, QUICKLY_ON_LINE = 1e-3, 2e-2  # what an answer may miss the line by
 SAME = 1e-5  # difference of roughnesses of a blur that stays
 CLOSE = 0.05  # part of the way from which a wish is met by itself
@@ -77,14 +77,17 @@ def nearest(present: DraggedStack, wish: Target, now: Target | None = None, quic
     if present.missed(possible, present.space.counted) < EXACT:
         return _told(Nearest(present.renamed(possible), wish), grey)
     now = now or present.now(possible)
-    found, bound, part = _along(present, now, possible, quick)
+    found, bound, part, settled = _along(present, now, possible, quick)
     if bound is not None and (other := _elsewhere(present, possible, quick)) is not None:
         found, bound, part = other, None, 1.0
+    if bound is not None and present.space.slow and not (settled or (quick and part)):
+        further = _along(present, now, possible, quick, thorough=True)
+        found, bound, part = further[:3] if further[2] > part else (found, bound, part)
     if bound is not None and not present.space.slow:
         found, bound, part = _further(present, now, possible, found, bound, part)
     if bound is not None and (dimmer := _dimmed(present, now, possible, bound, quick)) is not None:
         found, part = dimmer, 1.0
-    if bound is None and not quick:
+    if bound is None and not quick and _beside(found, possible) > EXACT:
         found = _met(found, possible) or found
     if part < LEAST:
         found, part = present.renamed(present.now(possible)), 0.0
@@ -114,7 +117,7 @@ def _dimmed(present: DraggedStack, now: Target, wish: Target, bound: Bound, quic
     dimmed = np.abs(np.subtract(lobe.colour, before.colour)).max() > ROUNDED
     if _named(bound, wish) != "bright" or dimmed or lobe.roughness <= before.roughness + SAME:
         return None
-    dim, stopped, _ = _along(present, now, wish.with_energy(k, DIMMED * np.array(lobe.colour)), quick)
+    dim, stopped, *_ = _along(present, now, wish.with_energy(k, DIMMED * np.array(lobe.colour)), quick)
     if stopped is not None:
         return None
     return _along(dim.at(dim.point.x), dim.now(wish), wish, quick)[0]
@@ -128,29 +131,25 @@ def _colour_lost(present: DraggedStack, wish: Target, possible: Target) -> str |
     return "mirror" if wish.lobes[0].base == "mirror" else "colour"
 
 
-def _along(start: DraggedStack, now: Target, wish: Target, quick: bool) -> tuple[DraggedStack, Bound | None, float]:
-    """The last stack on the line to a wish, the bound there, and the part of the way.
+def _along(
+    start: DraggedStack, now: Target, wish: Target, quick: bool, thorough: bool = False
+) -> tuple[DraggedStack, Bound | None, float, bool]:
+    """The last stack on the line to a wish, the bound there, the part of the way, and whether the search ended there.
 
-    A search that ends beside the line is begun again for a part of the way, unless it is quick.
+    thorough: as `Line.last`.
     """
     here, goal = _readings(start, now, now), _readings(start, now, wish)
     allowed = QUICKLY_ON_LINE if quick else ON_LINE
-    found = first = _last(start, here, goal, wish, quick)
-    share = 1.0
-    for shorter in () if quick else SHORTER:
-        if found.off < allowed and found.part < 1 + allowed:
-            break
-        share = shorter * min(max(first.part, 0.0), 1.0)
-        found = _last(start, here, here + share * (goal - here), wish, quick)
+    found = _last(start, here, goal, wish, quick, thorough=thorough)
     if found.off >= allowed or found.part >= 1 + allowed:
-        found = Reached(start.point, 0.0, 0.0, first.bound)
+        found = Reached(start.point, 0.0, 0.0, found.bound, settled=False)
     stack = dataclasses.replace(start, point=found.point).renamed(wish)
-    if share < 1 or found.part == 0:
-        return stack, first.bound or start.space.unmet(int(np.argmax(np.abs(goal - here)))), share * found.part
+    if found.part == 0:
+        return stack, found.bound or start.space.unmet(int(np.argmax(np.abs(goal - here)))), 0.0, found.settled
     close = not quick and found.off < CLOSE and abs(1 - found.part) < CLOSE
     if found.bound is not None and close and (met := _met(stack, wish)) is not None:
-        return met, None, 1.0
-    return stack, found.bound, found.part
+        return met, None, 1.0, True
+    return stack, found.bound, found.part, found.settled
 
 
 def _further(
@@ -165,7 +164,7 @@ def _further(
     for _ in range(HALVINGS):
         middle = (part + end) / 2
         asked = present.space.target_of(here + middle * (goal - here), wish)
-        stack, stopped, _ = _along(found, found.now(asked), asked, False)
+        stack, stopped, *_ = _along(found, found.now(asked), asked, False)
         other = stack if stopped is None else _elsewhere(present, asked, False)
         if other is not None:
             found, part = other, middle
@@ -185,9 +184,18 @@ def _readings(start: DraggedStack, now: Target, wish: Target) -> np.ndarray:
     return goal
 
 
-def _last(start: DraggedStack, here: np.ndarray, goal: np.ndarray, wish: Target, quick: bool) -> Reached:
+def _beside(found: DraggedStack, wish: Target) -> float:
+    """The largest difference of the lobes of a stack, of a pair on the average, from those of a wish."""
+    space = found.space
+    return float(np.abs(space.goal(found.now(wish)) - space.goal(wish))[space.counted].max())
+
+
+def _last(
+    start: DraggedStack, here: np.ndarray, goal: np.ndarray, wish: Target, quick: bool, thorough: bool = False
+) -> Reached:
     line = Line(start.point, here, goal, *start.constant(wish), enough=QUICK if quick else EXACT)
-    return line.last(QUICK_READINGS if quick else READINGS)
+    most = (LONG_READINGS if thorough else READINGS)[quick]
+    return line.last(most // 2 if thorough and start.space.winds else most, thorough)
 
 
 def _met(stack: DraggedStack, wish: Target) -> DraggedStack | None:

@@ -82,7 +82,7 @@ class Approach:
                 if off < MET:
                     return x
                 far = reach * space.reach(x, FURTHER, LITTLE)[free]
-                tried = step_within(space, x, missing, rows @ slopes, free, far, units(x[free]), self.caps)
+                tried = step_within(space, space.box, x, missing, rows @ slopes, free, far, units(x[free]), self.caps)
                 there = space.reading(tried, free)
                 now = self._seen(there.value)
                 nearer = float(np.linalg.norm(rows @ (goal - now)))
@@ -137,6 +137,7 @@ class Approach:
 
 def step_within(
     space: Space,
+    box: tuple[Array, Array],
     x: Array,
     missing: Array,
     slopes: Array,
@@ -150,7 +151,7 @@ def step_within(
     slopes: over coordinates `free`. far, size: of these, the longest steps and units. caps: coordinates that stay below
     others.
     """
-    low, high = (end[free] - x[free] for end in space.box)
+    low, high = (end[free] - x[free] for end in box)
     for below, above in caps:
         high[free == below] = x[above] - x[below]
     low, high = np.maximum(low, -far) / size, np.minimum(high, far) / size
