@@ -10,9 +10,11 @@ import pytest
 import velatura as vt
 from velatura.editor import appearance
 from velatura.inverse import Infeasible, Target, invert, invert_stack
+from velatura.inverse.lobes.interface import CONDUCTOR_MAX
 from velatura.inverse.local.dragged import DraggedStack, seen
 from velatura.inverse.nearest import Nearest, nearest
-from velatura.model import named
+from velatura.model import Model, named
+from velatura.optics import fresnel
 from velatura.stack import Stack
 
 pytestmark = pytest.mark.usefixtures("one_thread")
@@ -31,10 +33,10 @@ def lobes_of(stack: Stack) -> Target:
     return seen(stack, Target([{"energy": 0.1}, {"energy": 0.1, "base": base}]), AVERAGED)
 
 
-def answer(stack: Stack, wish: Target) -> Nearest:
-    present = DraggedStack.of(stack, wish, AVERAGED)
+def answer(stack: Stack, wish: Target, model: Model = AVERAGED, quick: bool = False) -> Nearest:
+    present = DraggedStack.of(stack, wish, model)
     assert present is not None
-    return nearest(present, wish)
+    return nearest(present, wish, quick=quick)
 
 
 @pytest.mark.parametrize("stack", [PLASTIC, METAL], ids=["plastic", "metal"])
@@ -120,3 +122,33 @@ def test_a_pair_wished_brighter_and_blurred_at_once_is_refused_for_what_stops_it
     for brighter, blurrier, exists in ((1.0, 1.2, True), (1.1, 1.0, False)):
         lobe = {"energy": brighter * reached.colour[0], "alpha": blurrier * reached.roughness, "interfaces": 2}
         assert (invert.search(Target([lobe]), AVERAGED) is not None) == exists
+
+
+def test_a_smooth_pair_moves_towards_a_wish_that_is_too_bright() -> None:
+    """By the default model, which reads the pair at rest as it does, since no interface of it is rough.
+
+    Expected: what the model in closed form reaches for the same wish, of which this one differs by little.
+    """
+    pair = Stack([vt.Interface(eta=2.13), vt.Interface(eta=1.54)])
+    wish = Target([{"energy": 0.7, "alpha": 0.05, "interfaces": 2}])
+    solved, averaged = (answer(pair, wish, model) for model in (named("velatura"), AVERAGED))
+    assert solved.reason == averaged.reason == "energy"
+    assert solved.part == pytest.approx(averaged.part, rel=0.05)
+    assert solved.reached.lobes[0].colour == pytest.approx(averaged.reached.lobes[0].colour, rel=0.02)
+
+
+def test_a_bound_is_the_same_under_the_hand_and_at_rest() -> None:
+    """By the default model, a coat that is wished brighter than its gold allows.
+
+    Expected: the gold below is as bright as metals are, in a channel, and its lobe has stayed.
+    """
+    model = named("velatura")
+    metal = vt.Interface(eta=(0.18, 0.42, 1.37), k=(3.07, 2.35, 1.77), alpha=0.2)
+    gold = Stack([vt.Interface(eta=1.5, alpha=0.05), vt.Medium(sigma_a=(0, 0.2, 0.8)), metal])
+    now = seen(gold, Target([{"energy": 0.1}, {"energy": 0.1, "base": "conductor"}]), model)
+    hand, rest = (answer(gold, now.with_energy(0, (0.4,) * 3), model, quick) for quick in (True, False))
+    assert rest.reason == "bright" and hand.part == pytest.approx(rest.part, rel=0.02)
+    coat, metal = rest.stack.stack.interfaces
+    brightest = fresnel.normal_incidence(np.divide(metal.eta, coat.eta), np.divide(metal.k, coat.eta)).max()
+    assert brightest == pytest.approx(CONDUCTOR_MAX, abs=1e-6)
+    assert np.array(rest.reached.lobes[1].colour) == pytest.approx(now.lobes[1].colour, abs=2e-3)

@@ -23,7 +23,7 @@ from velatura.stack import Stack
 
 EFFORT = EFFORTS[:1]  # to find a stack that is not near
 # Readings of a slow model, of one line: at rest and under the hand; and where slopes are measured
-READINGS, LONG_READINGS = (10, 6), (36, 16)
+READINGS, LONG_READINGS = (10, 8), (36, 16)
 QUICK = 2e-3  # by which an answer under the hand may miss its place on the line, in units of readings
 ON_LINE, QUICKLY_ON_LINE = 1e-3, 2e-2  # what an answer may miss the line by
 SAME = 1e-5  # difference of roughnesses of a blur that stays
@@ -80,9 +80,11 @@ def nearest(present: DraggedStack, wish: Target, now: Target | None = None, quic
     found, bound, part, settled = _along(present, now, possible, quick)
     if bound is not None and (other := _elsewhere(present, possible, quick)) is not None:
         found, bound, part = other, None, 1.0
-    if bound is not None and present.space.slow and not (settled or (quick and part)):
+    if bound is not None and present.space.slow and not (settled or present.space.winds or (quick and part)):
         further = _along(present, now, possible, quick, thorough=True)
         found, bound, part = further[:3] if further[2] > part else (found, bound, part)
+    if bound is not None and part < LEAST and present.space.slow and not quick:
+        found, bound, part = _by_closed_form(present, now, possible) or (found, bound, part)
     if bound is not None and not present.space.slow:
         found, bound, part = _further(present, now, possible, found, bound, part)
     if bound is not None and (dimmer := _dimmed(present, now, possible, bound, quick)) is not None:
@@ -173,6 +175,19 @@ def _further(
     return found.renamed(wish), bound, part
 
 
+def _by_closed_form(
+    present: DraggedStack, now: Target, wish: Target
+) -> tuple[DraggedStack, Bound | None, float] | None:
+    """The same of a slow model as `_along`, from the answer of the nearest one that adds up layers."""
+    near = nearest(present.quickly, wish)
+    fresh = DraggedStack.of(near.stack.stack, wish, present.model, with_pins=True) if near.part >= LEAST else None
+    if fresh is None:
+        return None
+    fresh = dataclasses.replace(fresh, tail=present.tail, name=present.name, diffuse=present.diffuse)
+    found, bound, part, _ = _along(fresh, now, wish, False)
+    return (found, bound, part) if part >= LEAST else None
+
+
 def _readings(start: DraggedStack, now: Target, wish: Target) -> np.ndarray:
     """Readings of a wish; of lobes whose blur stays, each interface keeps its own."""
     goal = start.space.goal(wish)
@@ -195,7 +210,7 @@ def _last(
 ) -> Reached:
     line = Line(start.point, here, goal, *start.constant(wish), enough=QUICK if quick else EXACT)
     most = (LONG_READINGS if thorough else READINGS)[quick]
-    return line.last(most // 2 if thorough and start.space.winds else most, thorough)
+    return line.last(most, thorough)
 
 
 def _met(stack: DraggedStack, wish: Target) -> DraggedStack | None:
