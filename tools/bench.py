@@ -52,6 +52,7 @@ SMOKE = {
     "interfaces": "--rounds 2 --most 2 --spp 1 --size 8 --count 64",
     "memory": "--rounds 1 --steps import",
     "metals": "--metals Cu --coats 2",
+    "nearest": "--wishes 3 --brute 50 --model bati2021",
     "models": "--rounds 2 --spp 1 --size 8 --models bati2021",
     "pigments": "--mixtures 3",
     "preparation": "--rounds 2 --presets bare-gold --kinds isotropic",

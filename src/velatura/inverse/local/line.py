@@ -176,14 +176,19 @@ class Line:
     def _known(self) -> dict[tuple[bytes, bytes], Reading]:
         return {}
 
-    def _reached(self, x: Array, value: Array, correction: _Correction) -> Reached:
+    def placed(self, value: Array) -> tuple[float, float]:
+        """The part of the way of a reading, and what it misses the line by."""
         gone = (value - self.origin) / self._scale
         way, counted = self._way, self.start.space.counted
         far = float(way[counted] @ way[counted])
         part = float(gone[counted] @ way[counted]) / far if far > MET**2 else 1.0
-        off = float(np.abs((gone - part * way)[counted]).max())
+        return part, float(np.abs((gone - part * way)[counted]).max())
+
+    def _reached(self, x: Array, value: Array, correction: _Correction) -> Reached:
+        part, off = self.placed(value)
+        way = self._way[self.start.space.counted]
         point = Point(self.start.space, x, Reading(value, np.empty((len(value), 0))))
-        there = abs(1 - part) * float(np.abs(way[counted]).max(initial=0.0)) < 10 * self.enough
+        there = abs(1 - part) * float(np.abs(way).max(initial=0.0)) < 10 * self.enough
         return Reached(point, part, off, None if there else self._bound(x, correction))
 
     def _bound(self, x: Array, correction: _Correction) -> Bound:

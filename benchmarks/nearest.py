@@ -1,0 +1,119 @@
+"""Whether a wish from a present material gets one answer, the nearest, and how long that takes.
+
+    python benchmarks/nearest.py [--wishes 60] [--beyond] [--brute 2000] [--model velatura] [--seed 0]
+
+Random stacks of the inverse are wished to have a lobe of other energy or blur, `--beyond` alone those that are not met.
+Answers under the hand, at rest and by `invert` must agree in energies and roughnesses. Beside each answer at rest that
+does not meet its wish, stacks are drawn within the bounds, by their coordinates: none that lies on the line to the
+wish may be nearer. Times are of the processor.
+"""
+
+from __future__ import annotations
+
+import sys
+import time
+from collections.abc import Iterator
+
+import numpy as np
+from inverse import physical_targets
+from rows import parsed, row
+
+from velatura.inverse import Infeasible, Target, invert, invert_stack
+from velatura.inverse.local.coordinates import units
+from velatura.inverse.local.dragged import DraggedStack
+from velatura.inverse.local.line import Line
+from velatura.inverse.nearest import Nearest, nearest
+from velatura.model import DEFAULT, Model, named
+from velatura.model.variance import Roughness
+
+SAME, NEARER, ON_LINE = 2e-3, 0.02, 0.01  # differences of lobes, shares of the way, and of readings
+CHANGE, BRIGHTEST, ROUGHEST = 1.5, 0.95, 0.9  # of wishes: the most, as a logarithm
+SPREAD = (1e-3, 1.0)  # of stacks that are drawn, in units of coordinates
+
+
+def wishes(model: Model, seed: int) -> Iterator[tuple[DraggedStack, Target]]:
+    """Present stacks, and their lobes with one changed."""
+    rng = np.random.default_rng(seed)
+    for target in physical_targets(10**9, model, seed):
+        k, of_energy, scale = int(rng.integers(len(target.lobes))), rng.random() < 0.6, np.exp(rng.uniform(-1, 1))
+        lobe, scale = target.lobes[k], float(scale**CHANGE)
+        if of_energy:
+            wish = target.with_energy(k, tuple(np.minimum(scale * np.array(lobe.colour), BRIGHTEST).tolist()))
+        else:
+            u, v = np.minimum(scale * np.array(lobe.axes[:2]), ROUGHEST)
+            wish = target.with_roughness(k, Roughness(u, v, lobe.axes.rotation))
+        found = invert.search(target, model)
+        present = DraggedStack.of(found.stack, wish, model) if found else None
+        if present is not None:
+            yield present, wish
+
+
+def lobes(target: Target) -> np.ndarray:
+    """Energies and roughnesses."""
+    return np.array([[*lobe.colour, *lobe.axes[:2]] for lobe in target.lobes])
+
+
+def by_invert(present: DraggedStack, wish: Target, model: Model) -> Target:
+    """The answer of `invert` from a material, which is the first way out where it refuses."""
+    asked = wish.model_copy(update={"start": present.stack})
+    try:
+        solution = invert_stack(asked, model)
+    except Infeasible as error:
+        assert error.nearest is not None
+        return error.nearest
+    return solution.reached or wish
+
+
+def nearer(present: DraggedStack, answer: Nearest, count: int, rng: np.random.Generator) -> float:
+    """The part of the way of the furthest of stacks that are drawn about an answer and lie on the line."""
+    space, x = answer.stack.space, answer.stack.point.x
+    held, _ = answer.stack.constant(answer.wish)
+    spread = np.exp(rng.uniform(*np.log(SPREAD), (1, count))) * units(x)[:, None]
+    points = np.clip(x[:, None] + spread * rng.normal(size=(len(x), count)), *(end[:, None] for end in space.box))
+    points[held] = x[held, None]
+    points = points[:, [space.broken(point, None) is None for point in points.T]]
+    line = Line(present.point, space.goal(present.now(answer.wish)), space.goal(answer.wish))
+    found = (line.placed(reading) for reading in space.read(points).T)
+    return max((part for part, off in found if off < ON_LINE), default=0.0)
+
+
+def main() -> int:
+    options = parsed(
+        __doc__,
+        wishes=60,
+        beyond=(False, "those that are not met alone"),
+        brute=(2000, "stacks that are drawn beside an answer"),
+        model=DEFAULT,
+        seed=0,
+    )
+    model, rng, left, failed = named(options.model), np.random.default_rng(options.seed), options.wishes, 0
+    seconds = {"hand": list[float](), "rest": list[float]()}
+    met = 0
+    for present, wish in wishes(model, options.seed):
+        answers = {}
+        for way, taken in seconds.items():
+            start = time.process_time()
+            answers[way] = nearest(present.at(present.point.x), wish, quick=way == "hand")
+            taken.append(time.process_time() - start)
+        rest = answers["rest"]
+        if rest.met and options.beyond:
+            continue
+        met, left = met + rest.met, left - 1
+        reached = [lobes(answer.reached) for answer in answers.values()] + [lobes(by_invert(present, wish, model))]
+        apart = float(max(np.abs(one - reached[1]).max() for one in reached))
+        further = 0.0 if rest.met else nearer(present, rest, options.brute, rng) - rest.part
+        if apart > SAME or further > NEARER:
+            failed += 1
+            print(
+                f"{apart:.1e} apart, {further:.3f} further than {rest.part:.3f} ({rest.why}): {wish.to_dict()['lobes']}"
+            )
+        if not left:
+            break
+    for way, taken in seconds.items():
+        row("nearest", way, taken, remark=f"95 % below {np.quantile(taken, 0.95):.2f}, at most {max(taken):.2f} s")
+    print(f"{options.model}: {met} of {options.wishes} wishes met, {failed} with several answers or a nearer one")
+    return int(failed > 0)
+
+
+if __name__ == "__main__":
+    sys.exit(main())
