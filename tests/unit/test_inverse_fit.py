@@ -169,7 +169,7 @@ def test_a_descent_reads_a_solved_model_seldom(monkeypatch: pytest.MonkeyPatch) 
     model = named("velatura")
     table = table_of(true, Directions.about_lobes(True), model)
     monkeypatch.setattr(angles, "read", counted)
-    end = descent.Descent(table, true.replace(layer0_alpha_u=0.15, layer0_eta=1.4), model, 4.0).run()
+    end = descent.Descent(table=table, start=true.replace(layer0_alpha_u=0.15, layer0_eta=1.4), model=model).run()
     assert 3 < len(readings) <= 1 + descent.ALONE * 3
     assert end.stack.interfaces[0].alpha == pytest.approx((0.1, 0.2), rel=1e-2)
 

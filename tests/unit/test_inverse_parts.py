@@ -9,8 +9,8 @@ import pytest
 
 from velatura.inverse import Above, Choice, Directions, EquivalenceClass, Target, invert_interface
 from velatura.inverse.coats import _choices
-from velatura.inverse.fitting.angles import ANGLES, AZIMUTHS, TILTS, ReflectanceTable
-from velatura.inverse.fitting.descent import CONDUCTOR, DEPTH_MAX, Descent, extinction, share
+from velatura.inverse.fitting.angles import ANGLES, AZIMUTHS, TILTS
+from velatura.inverse.fitting.free_values import CONDUCTOR, DEPTH_MAX, FreeValues, extinction, share
 from velatura.inverse.lobes import interface, stacks
 from velatura.inverse.lobes.interface import DENSER, RARER
 from velatura.inverse.lobes.partial_stack import Layers
@@ -32,7 +32,7 @@ HEAD_ON = Directions.of(np.zeros(2), np.zeros(2), np.zeros(2))
 def free(layer: Any, darkest: float = 0.0) -> dict[tuple[Any, ...], tuple[float, float, bool]]:
     """Bounds, and whether they are logarithmic, by keys and channel, of a layer below a coat."""
     stack = Stack([Interface(eta=1.5), layer, *([] if layer.surface else [Interface(conductor="mirror")])])
-    found = Descent(ReflectanceTable(HEAD_ON, np.ones((3, 2))), stack, AVERAGED, 4.0, darkest).free
+    found = FreeValues(start=stack, darkest=darkest).free
     return {(*one.keys, one.channel): (one.low, one.high, one.logarithmic) for one in found if one.layer == 1}
 
 

@@ -19,27 +19,19 @@ from numpy.typing import NDArray
 from velatura.errors import InvalidInput
 from velatura.inverse.fitting import angles
 from velatura.inverse.fitting.angles import ReflectanceTable, radiance
-from velatura.inverse.lobes.interface import conductor_extinction
-from velatura.inverse.lobes.partial_stack import CLEAR, Array, written
+from velatura.inverse.fitting.free_values import Free, FreeValues, extinction, metals
+from velatura.inverse.lobes.partial_stack import Array
 from velatura.inverse.local.approach import Secants
 from velatura.model import Model, named, variance_kind
-from velatura.model.guards import ALPHA_MIN
 from velatura.model.papers import bsdf
 from velatura.ops import Value
-from velatura.optics import fresnel
 from velatura.stack import (
-    DiffuseValues,
-    InterfaceValues,
-    LayerValues,
     Material,
     MaterialLike,
-    MediumValues,
     Stack,
     as_described,
     single,
 )
-from velatura.stack.layers import film_key
-from velatura.stack.values import THICKEST_NM
 
 STEP, STRIDE = 1e-5, 1e-3  # of a value, to see how a model changes: in closed form, and solved anew for each value
 MAPPED = 3  # readings by a model without a closed form, between descents of the one that stands in for it
@@ -49,9 +41,7 @@ MOST = 70  # of these readings
 # Rounds of a descent in closed form, of one that stands in for another model, and for how many values these are
 ROUNDS, STANDING, FEW_VALUES = 100, 25, 16
 TOLERANCE = 1e-9  # relative change in a round where it ends
-CONDUCTOR, BRIGHTEST = (0.02, 30.0), 0.999  # bounds of a metal's eta, and of its reflectance in air
-DEPTH_MAX = 10.0  # of a medium
-THINNEST_NM, OUTSIDE = 1.0, 1e3  # of a film, and errors where there is no material
+OUTSIDE = 1e3  # errors where there is no material
 AS_WELL, EXACT = 1.05, 1e-6  # of the smallest error, and beside it: other stacks fit as well
 LIKELY, DRAWN = 0.95, 4000  # the probability of an interval, and the points that it is taken from
 SHARED = 1.25  # by which it is wider, for errors of the model that all angles share, as walked stacks ask for
@@ -119,40 +109,6 @@ class Fit:
         }
 
 
-@dataclass(frozen=True)
-class Free:
-    """A value that may change: its layer, the keys that share it, its channel (None for all alike), its bounds."""
-
-    layer: int
-    keys: tuple[str, ...]
-    channel: int | None
-    low: float
-    high: float
-    logarithmic: bool
-
-    @property
-    def bounds(self) -> tuple[float, float]:
-        """Bounds of its coordinate."""
-        return self.coordinate(self.low), self.coordinate(self.high)
-
-    def name(self, layer: int) -> str:
-        """The flat name in a stack where it belongs to that layer, and the channel."""
-        key = "alpha" if len(self.keys) > 1 else self.keys[0]
-        return f"layer{layer}_{key}" + ("" if self.channel is None else f" {'rgb'[self.channel]}")
-
-    def shown(self, x: Value) -> Value:
-        """The value of a coordinate."""
-        return np.exp(x) if self.logarithmic else x
-
-    def rounded(self, value: float) -> float:
-        """The value as it is written: a roughness at its lower bound is smooth."""
-        return 0.0 if self.low == ALPHA_MIN and value < 1.001 * ALPHA_MIN else float(value)
-
-    def coordinate(self, value: float) -> float:
-        kept = min(max(value, self.low), self.high)
-        return float(np.log(kept)) if self.logarithmic else kept
-
-
 def fit(
     table: ReflectanceTable,
     starts: Sequence[MaterialLike],
@@ -194,10 +150,18 @@ def descended(
     """
     stacks = [single(start, "fit") for start in starts]
     coated = [start for start in stacks if any(start.films)]
-    ends = [Descent(table, start, model, eta_max, darkest, films=films).run(ALONE) for start in coated]
+    ends = [
+        Descent(table=table, start=start, model=model, eta_max=eta_max, darkest=darkest, films=films).run(ALONE)
+        for start in coated
+    ]
     bare = [start for start in stacks if not any(start.films)]
     rounds = ROUNDS if model.closed_form else STANDING
-    ends += [Descent(table, start, model.surrogate, eta_max, darkest).run(rounds=rounds).of(model) for start in bare]
+    ends += [
+        Descent(table=table, start=start, model=model.surrogate, eta_max=eta_max, darkest=darkest)
+        .run(rounds=rounds)
+        .of(model)
+        for start in bare
+    ]
     ends.sort(key=lambda end: end.cost)
     if ends and not model.closed_form and not any(ends[0].descent.start.films):
         ends[0] = ends[0].descent.run(LAST)
@@ -321,40 +285,13 @@ class End:
         return np.asarray(SHARED**2 * (wider * alike + noise))
 
 
-@dataclass(frozen=True)
-class Descent:
-    """A descent from one stack: its indices, roughnesses, absorption and albedo change; all else stays.
-
-    darkest: the least `share` of conductors; 0 for metals, k >= eta. gap: added to all residuals, (3 N,). films:
-    whether indices and thicknesses of films change.
-    """
+@dataclass(frozen=True, kw_only=True)
+class Descent(FreeValues):
+    """A descent from one stack. gap: added to all residuals, (3 N,)."""
 
     table: ReflectanceTable
-    start: Stack
     model: Model
-    eta_max: float
-    darkest: float = 0.0
     gap: Array | float = 0.0
-    films: bool = True
-
-    @cached_property
-    def material(self) -> Material:
-        """Values of the start: a colour (3, 1, 1), for channels, points and directions, or a float.
-
-        For k of a metal it has its reflectance, as a share of what eta allows: that is what absorption trades with.
-        """
-        material = Material.of(self.start).each(lambda address, value: value[..., None] if address.colour else value)
-        return _metals(material, lambda layer: share(layer.eta, layer.k))
-
-    @cached_property
-    def free(self) -> list[Free]:
-        found: list[Free] = []
-        for n, layer in enumerate(self.material.layers):
-            if type(layer) in FREE:
-                found += FREE[type(layer)](n, layer, self.eta_max, self.darkest)
-            if isinstance(layer, InterfaceValues) and self.films:
-                found += _of_films(n, layer, self.eta_max)
-        return found
 
     @property
     def slow(self) -> bool:
@@ -377,8 +314,7 @@ class Descent:
     @cached_property
     def start_end(self) -> End:
         """The start, as far as it lies within the bounds."""
-        x = np.array([free.coordinate(self._first(free)) for free in self.free])
-        return End(self, x, self.residuals(x[None])[0])
+        return End(self, self.first, self.residuals(self.first[None])[0])
 
     def run(self, readings: int = ALONE, rounds: int = ROUNDS) -> End:
         """The end of the descent, after a number of rounds at most, or, where one point is read at a time, of readings
@@ -399,7 +335,7 @@ class Descent:
                 np.clip(first.x, bounds[0] + inset, bounds[1] - inset),
                 jac=self.jacobian,
                 bounds=bounds,
-                x_scale=self._scale,
+                x_scale=self.scale,
                 xtol=TOLERANCE,
                 ftol=TOLERANCE,
                 gtol=None,
@@ -413,7 +349,7 @@ class Descent:
         secants = Secants(
             lambda x: self.residuals(x[None])[0],
             lambda x, residuals: self._differences(End(self, x, residuals)),
-            self._scale,
+            self.scale,
             low,
             high,
         )
@@ -429,7 +365,7 @@ class Descent:
             changed = {key: _changed(getattr(layer, key), free, shown) for key in free.keys}
             material = material.with_layer(free.layer, **changed)
         variance = variance_kind(Material.of(self.start, as_described))
-        seen = bsdf.body(_metals(material, lambda layer: extinction(layer.eta, layer.k)), self.model, variance)
+        seen = bsdf.body(metals(material, lambda layer: extinction(layer.eta, layer.k)), self.model, variance)
         return self.missed(len(x), *radiance(seen, self.table.directions)) + self.gap
 
     def _read(self, x: Array) -> Array:
@@ -479,33 +415,6 @@ class Descent:
         stride = np.where(end.x + STRIDE > high, -STRIDE, STRIDE)
         return ((self.residuals(end.x + np.diag(stride)) - end.residuals) / stride[:, None]).T
 
-    @property
-    def _scale(self) -> Array:
-        """Units of coordinates."""
-        return np.maximum(0.1 * np.ptp([free.bounds for free in self.free], axis=1), 1e-3)
-
-    def values(self, x: Array) -> Array:
-        """The values of points (P, free), a metal's k among them."""
-        value = np.transpose([free.shown(own) for free, own in zip(self.free, x.T)])
-        of = {(free.layer, free.channel): n for n, free in enumerate(self.free) if free.keys == ("eta",)}
-        for n, free in enumerate(self.free):
-            if free.keys == ("k",):
-                value[:, n] = extinction(value[:, of[free.layer, free.channel]], value[:, n])
-        return np.asarray(value)
-
-    def placed(self, x: Array) -> tuple[Stack, list[int]]:
-        """The material at a point, and its layers that are no clear media."""
-        material = self.material.each(lambda address, value: np.ravel(value))
-        for free, coordinate in zip(self.free, x):
-            for key in free.keys:
-                own = np.array(_of_key(material, free.layer, key))
-                own[slice(None) if free.channel is None else free.channel] = free.rounded(free.shown(coordinate))
-                material = _with_key(material, free.layer, key, own)
-        changed = {(free.layer, key) for free in self.free for key in free.keys}
-        values = _metals(material, lambda layer: extinction(layer.eta, layer.k)).values()
-        found = self.start.replace(**{at.name: written(x) for at, x in values if (at.layer, at.key) in changed})
-        return found, [n for n, layer in enumerate(Material.of(found).layers) if not _clear(layer)]
-
     def _smaller_first(self, x: Array) -> Array:
         """The same point, turned interfaces with the smaller roughness along their first axis, turned by 0 to 180."""
         x, of = x.copy(), {(free.layer, free.keys): n for n, free in enumerate(self.free)}
@@ -517,84 +426,6 @@ class Descent:
                 x[n] %= 180
         return x
 
-    def _first(self, free: Free) -> float:
-        value = np.ravel(_of_key(self.material, free.layer, free.keys[0]))
-        return float(np.mean(value) if free.channel is None else value[free.channel])
-
-
-def _of_base(n: int, layer: DiffuseValues, eta_max: float, darkest: float) -> list[Free]:
-    return [Free(n, ("albedo",), c, 0.0, 1.0, False) for c in range(3)]
-
-
-def _of_medium(n: int, layer: MediumValues, eta_max: float, darkest: float) -> list[Free]:
-    if layer.depth <= 0:
-        return []
-    return [Free(n, ("sigma_a",), c, 0.0, DEPTH_MAX / layer.depth, False) for c in range(3)]
-
-
-def _of_interface(n: int, layer: InterfaceValues, eta_max: float, darkest: float) -> list[Free]:
-    axes = [("alpha_u", "alpha_v")] if layer.alpha_u == layer.alpha_v else [("alpha_u",), ("alpha_v",)]
-    found = [Free(n, keys, None, ALPHA_MIN, 1.0, True) for keys in axes]
-    if layer.alpha_u != layer.alpha_v and layer.rotation != 0:
-        found.append(Free(n, ("rotation",), None, layer.rotation - 180, layer.rotation + 180, False))
-    if layer.kind == "dielectric":
-        eta = layer.eta
-        channels = range(3) if np.ptp(eta) > 0 else (None,)
-        found += [Free(n, ("eta",), c, min(1.0, eta.min()), max(eta_max, eta.max()), True) for c in channels]
-    if layer.kind == "conductor":
-        # A conductor has k >= eta, unless it begins with less, or may be as dark as any absorbing base
-        found += [Free(n, ("eta",), c, *CONDUCTOR, True) for c in range(3)]
-        found += [Free(n, ("k",), c, min(float(np.ravel(layer.k)[c]), darkest), 1.0, False) for c in range(3)]
-    return found
-
-
-def _of_films(n: int, layer: InterfaceValues, eta_max: float) -> list[Free]:
-    found: list[Free] = []
-    for k, film in enumerate(layer.films):
-        channels = range(3) if np.ptp(film.eta) > 0 else (None,)
-        high = max(eta_max, np.max(film.eta))
-        found += [Free(n, (film_key(k, "eta"),), c, min(1.0, np.min(film.eta)), high, True) for c in channels]
-        found.append(Free(n, (film_key(k, "thickness_nm"),), None, THINNEST_NM, THICKEST_NM, True))
-    return found
-
-
-def _of_key(material: Material, n: int, key: str) -> Value:
-    """A value of a layer, or of one of its films."""
-    return next(value for address, value in material.values() if (address.layer, address.key) == (n, key))
-
-
-def _with_key(material: Material, n: int, key: str, new: Value) -> Material:
-    """The material with such a value changed."""
-    return material.each(lambda address, value: new if (address.layer, address.key) == (n, key) else value)
-
-
-#: The values that may change, by layer; all others stay.
-FREE: dict[type, Callable[..., list[Free]]] = {
-    DiffuseValues: _of_base,
-    MediumValues: _of_medium,
-    InterfaceValues: _of_interface,
-}
-
-
-def share(eta: Value, k: Value) -> Value:
-    """The reflectance of a metal in air, from that of k = eta (0) to `BRIGHTEST` (1)."""
-    least = fresnel.normal_incidence(eta, eta)
-    return (fresnel.normal_incidence(eta, k) - least) / (BRIGHTEST - least)
-
-
-def extinction(eta: Value, share: Value) -> Value:
-    """The k that reflects this share."""
-    least = fresnel.normal_incidence(eta, eta)
-    return conductor_extinction(least + share * (BRIGHTEST - least), eta)
-
-
-def _metals(material: Material, k: Callable[[InterfaceValues], Value]) -> Material:
-    """The material with another `k` of its conductors."""
-    for n, layer in enumerate(material.layers):
-        if isinstance(layer, InterfaceValues) and layer.kind == "conductor":
-            material = material.with_layer(n, k=k(layer))
-    return material
-
 
 def _changed(value: Value, free: Free, x: Array) -> Value:
     """A value at several points, (P, 1) of a number, in all or one of the channels of a colour."""
@@ -605,10 +436,3 @@ def _changed(value: Value, free: Free, x: Array) -> Value:
     own = np.broadcast_to(value, (3, *x.shape)).copy()
     own[free.channel] = x
     return own
-
-
-def _clear(layer: LayerValues) -> bool:
-    """Whether a layer is a medium without effect."""
-    if not isinstance(layer, MediumValues):
-        return False
-    return bool(np.maximum(layer.sigma_a, layer.sigma_s).max() * layer.depth < CLEAR)

@@ -198,7 +198,7 @@ def _simplest(
     closed = model.closed_form
 
     def itself(start: Stack) -> End:
-        return Descent(table, start, model, eta_max, DARKEST, films=False).run()
+        return Descent(table=table, start=start, model=model, eta_max=eta_max, darkest=DARKEST, films=False).run()
 
     starts = _of_sets(stack, interfaces, table, model, eta_max)
     found = descended(table, starts, model, eta_max, DARKEST, films=False)
@@ -224,7 +224,7 @@ def _of_sets(stack: Stack, interfaces: int, table: ReflectanceTable, model: Mode
 
     def closest(sets: Sequence[tuple[int, ...]], model: Model, tried: int) -> list[tuple[int, ...]]:
         starts = [_of_some(stack, kept) for kept in sets]
-        costs = [Descent(table, start, model, eta_max).start_end.cost for start in starts]
+        costs = [Descent(table=table, start=start, model=model, eta_max=eta_max).start_end.cost for start in starts]
         return [sets[n] for n in np.argsort(costs, kind="stable")[:tried]]
 
     if comb(free, count - interfaces) <= SETS:
@@ -244,7 +244,7 @@ def _with_one_more(stack: Stack) -> Stack:
 
 def _closest(table: ReflectanceTable, starts: list[Stack], model: Model, eta_max: float, count: int) -> list[Stack]:
     """The starts that are closest before any descent."""
-    costs = [Descent(table, start, model, eta_max).start_end.cost for start in starts]
+    costs = [Descent(table=table, start=start, model=model, eta_max=eta_max).start_end.cost for start in starts]
     return [starts[n] for n in np.argsort(costs, kind="stable")[:count]]
 
 
