@@ -54,6 +54,7 @@ EXAMPLES = (
     "pigments",
     "polarised",
     "inverse",
+    "wishes",
     "fit",
     "simplify",
     "recover",

@@ -101,6 +101,27 @@ def test_several_stacks_and_the_class_as_a_picture(run: Run, folder: Path) -> No
     assert "pair.png" in out
 
 
+def test_a_wish_beyond_lobes_becomes_a_material(run: Run, folder: Path) -> None:
+    """Expected: the refusal of a clear pane with its way out, which is solved, as text, as JSON and as a file."""
+    pane = "layers: [interface: {eta: 1.5, alpha: 0.02}, interface: {eta: 1.0, alpha: 0.02}]"
+    Path("pane.yaml").write_text(f"passed: {{energy: [0.5, 0.3, 0.6], haze: 0.8}}\nstart: {{{pane}}}\n")
+    arguments = ("invert", "pane.yaml", "--model", "bati2021")
+    assert run(*arguments) == (
+        3,
+        "",
+        "velatura: no stack: passed: no medium absorbs (possible: a tinted medium below layer 0)\n",
+    )
+    status, out, err = run(*arguments, "--way", "1", "-o", "found.yaml")
+    assert (status, err, out.splitlines()[-1]) == (0, "", "found.yaml")
+    assert "asked: passed energy [0.5, 0.3, 0.6], haze 0.8; has: passed energy [0.5, 0.3, 0.6], haze 0.8" in out
+    seen = vt.lobes("found.yaml", 1.0, model="bati2021")
+    assert seen.passed[:, 0] == pytest.approx((0.5, 0.3, 0.6), abs=1e-3)
+    report = json.loads(run(*arguments, "--way", "1", "--json")[1])
+    assert report["reached"]["passed"][0]["haze"] == pytest.approx(0.8, abs=1e-3)
+    assert vt.Stack.from_dict(report["stack"]) == vt.load("found.yaml")
+    assert "--plot: draws classes of lobes alone" in run(*arguments, "--plot")[2]
+
+
 @pytest.mark.parametrize("model", ["velatura", "bati2021"])
 def test_what_cannot_be_exits_with_3(run: Run, folder: Path, model: str) -> None:
     """Expected: one line that says why and what is possible, the same as JSON, and nothing written; .36 is what a

@@ -33,6 +33,7 @@ from velatura.cli import app
 from velatura.comparison import evaluated_lobes, pictures, plugins
 from velatura.editor import server
 from velatura.errors import Incomplete
+from velatura.inverse import wishes
 from velatura.programs import fit
 from velatura.shader import closures
 from velatura.sweeps import run as sweeping
@@ -129,7 +130,7 @@ def files_of_readme(folder: Path) -> None:
 
 
 def files_of_inverse(folder: Path) -> None:
-    names = "target.yaml", None, "metal.yaml", "blue-over-red.yaml"
+    names = "target.yaml", None, "pane.yaml", "bright-edge.yaml", "metal.yaml", "blue-over-red.yaml"
     for name, text in zip(names, written("docs/how-to/inverse.md", "yaml")):
         if name:
             (folder / name).write_text(text)
@@ -293,7 +294,7 @@ def parse(text: str, folder: Path) -> None:
     path = folder / (named[1] if named else "block.yaml")
     path.write_text(text if not text.startswith("-") else f"layers:\n{text}")
     keys = yaml.safe_load(path.read_text()).keys()
-    if "lobes" in keys:
+    if keys & {"lobes", *wishes.KINDS}:
         inverse.load_target(path)
     elif "vary" in keys:
         sweeps.load_plan(path)

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Callable, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
@@ -14,7 +15,7 @@ from velatura.errors import InvalidInput, needs
 if TYPE_CHECKING:
     from rich.table import Table
 
-    from velatura.inverse import Solution, Target, TargetLobe
+    from velatura.inverse import Answer, Solution, Target, TargetLobe
     from velatura.model import Model
 
 SHOWN = 5e-5  # difference of energies or roughnesses that four digits show
@@ -51,9 +52,9 @@ def invert(
     settings: Switches = None,
     as_json: options.Json = False,
 ) -> None:
-    """Find stacks that have given lobes at normal incidence.
+    """Find stacks that have given lobes, or another appearance.
 
-    A target file lists lobes from the top, each by its energy and its blur:
+    A target file lists lobes at normal incidence from the top, each by its energy and its blur:
 
     \b
     name: Hazy metal
@@ -73,6 +74,14 @@ def invert(
       fixed       {eta, k, alpha, tau, films}: of each interface, or null: [1.5]
     Of the whole: exterior (1), eta_max (4), channels (mean or separate), name;
       start       a material, as a file has it, with which the search begins
+
+    Wishes beyond these, of lobes or of a start alone: energy, and angle (degrees):
+
+    
+      grazing     what is reflected at a second angle (75); lobe, alpha
+      passed      what a pane passes; alpha, or haze in its place
+      body        the colour of a base or scattering medium, seen from outside
+      film        the colour by a film's thickness; layer, film, thickest_nm
     """
     # Refuse what cannot work before anything slow begins
     from velatura import inverse
@@ -80,11 +89,14 @@ def invert(
 
     wanted, name, switches = read(target, model, settings)
     folder = _folder(output, count)
+    if plot and wanted.further:
+        raise InvalidInput(f"--plot: draws classes of lobes alone; the target asks for {wanted.further[0].key}, too")
     drawn = picture(target) if plot else None
 
+    solve: Callable[..., list[Any]] = inverse.answers if wanted.further else inverse.alternatives
     try:
         with progress.clock(f"Solving {Path(target).name}"):
-            found = inverse.alternatives(wanted, count, name, seed, **switches)
+            found = solve(wanted, count, name, seed, **switches)
     except Infeasible as error:
         if not 0 < way <= len(error.directions):
             if as_json:
@@ -95,8 +107,11 @@ def invert(
         taken = error.directions[way - 1]
         if not as_json:
             print(f"No stack: {error.why}. Taken in its place: {taken.words}.")
-        found = inverse.alternatives(taken.target, count, name, seed, **switches)
+        found = solve(taken.target, count, name, seed, **switches)
     paths = _write(found, output, folder, Path(target).stem)
+    if wanted.further:
+        _say(found, paths, as_json)
+        return
     if drawn:
         draw_classes(found[0], drawn)
 
@@ -114,6 +129,27 @@ def invert(
             print(line)
     say_for_which(found[0].model)
     for path in [*paths, *([drawn] if drawn else [])]:
+        print(path)
+
+
+def _say(found: list[Answer], paths: list[Path], as_json: bool) -> None:
+    """Print answers to wishes beyond lobes: what is asked for, what the stacks have, and these, unless they are
+    written."""
+    from velatura.stack import dumps
+
+    if as_json:
+        first = found[0]
+        report = {"feasible": True, "model": first.model.name, "stack": first.stack.to_dict(), "missed": first.missed}
+        more = {"stacks": [each.stack.to_dict() for each in found]} if len(found) > 1 else {}
+        print(json.dumps({**report, "reached": first.reached.to_dict(), **more}, allow_nan=False))
+        return
+    for one in found:
+        for wish, has in zip(one.target.further, one.reached.further):
+            print(f"asked: {wish.words()}; has: {has.words()}")
+        if not paths:
+            print(dumps(one.stack, "yaml"), end="")
+    say_for_which(found[0].model)
+    for path in paths:
         print(path)
 
 
@@ -193,7 +229,7 @@ def picture(source: str) -> Path:
     return files.check_writable(Path(f"{Path(source).stem}.png"), "a picture", (".png",))
 
 
-def _write(found: list[Solution], output: Path | None, folder: Path | None, stem: str) -> list[Path]:
+def _write(found: Sequence[Solution | Answer], output: Path | None, folder: Path | None, stem: str) -> list[Path]:
     from velatura.stack import save
 
     if output is None:

@@ -4,6 +4,7 @@ After Bati et al. 2021, "An Inverse Method for the Exploration of Layered Materi
 read by the model's own recursion, so that what is found holds for the model that renders it.
 """
 
+from velatura.inverse.answer import Answer, answer, answers
 from velatura.inverse.coats import Coated, coat
 from velatura.inverse.fitting.angles import Directions, ReflectanceTable, table_of
 from velatura.inverse.fitting.descent import Estimate, Fit, Other, fit
@@ -20,9 +21,12 @@ from velatura.inverse.measured import load_table
 from velatura.inverse.paints import Paint, PigmentFit, fit_pigment, load_reflectances, paint, paint_colour
 from velatura.inverse.reasons import Direction, Infeasible
 from velatura.inverse.solution import Solution
+from velatura.inverse.wishes import Body, FilmColour, Grazing, Passed
 
 __all__ = [
     "Above",
+    "Answer",
+    "Body",
     "Choice",
     "Coated",
     "Coordinate",
@@ -30,8 +34,10 @@ __all__ = [
     "Directions",
     "EquivalenceClass",
     "Estimate",
+    "FilmColour",
     "Fit",
     "Fixed",
+    "Grazing",
     "Infeasible",
     "Layers",
     "MixtureFit",
@@ -39,12 +45,15 @@ __all__ = [
     "Other",
     "Paint",
     "Pair",
+    "Passed",
     "PigmentFit",
     "ReflectanceTable",
     "Solution",
     "Target",
     "TargetLobe",
     "alternatives",
+    "answer",
+    "answers",
     "coat",
     "fit",
     "fit_pigment",

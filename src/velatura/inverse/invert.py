@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from velatura.errors import InvalidInput
 from velatura.inverse import refined
 from velatura.inverse.explain import infeasible
 from velatura.inverse.lobes import sampling
@@ -42,6 +43,9 @@ def invert_stack(
         Infeasible: there is no such stack; the error gives the reason, and the nearest targets that have one.
     """
     wanted = read(target)
+    if wanted.further:
+        key = wanted.further[0].key
+        raise InvalidInput(f"{key}: is no wish for lobes; velatura invert and vt.inverse.answer take it")
     chosen, start = model_of(wanted, model, **switches), wanted.start
     wanted = wanted.model_copy(update={"start": None})
     begun = refined.from_start(start, wanted, chosen) if start else None

@@ -61,14 +61,14 @@ class FreeValues:
     """Indices, roughnesses, absorption and albedo of a stack; all else stays.
 
     darkest: the least `share` of conductors; 0 for metals, k >= eta. films: whether indices and thicknesses of films
-    change. moving: whether a value does.
+    change. allowed: a value with the bounds that it may change within, None where it stays.
     """
 
     start: Stack
     eta_max: float = 4.0
     darkest: float = 0.0
     films: bool = True
-    moving: Callable[[Free], bool] = lambda free: True
+    allowed: Callable[[Free], Free | None] = lambda free: free
 
     @cached_property
     def material(self) -> Material:
@@ -87,7 +87,7 @@ class FreeValues:
                 found += FREE[type(layer)](n, layer, self.eta_max, self.darkest)
             if isinstance(layer, InterfaceValues) and self.films:
                 found += _of_films(n, layer, self.eta_max)
-        return [free for free in found if self.moving(free)]
+        return [free for each in found if (free := self.allowed(each))]
 
     @property
     def scale(self) -> Array:

@@ -73,7 +73,7 @@ def fit_target(
     """
     wanted = read(target)
     chosen = model_of(wanted, model, **switches)
-    found = [_with_media(solution.stack) for solution in _first(wanted, starts, chosen.surrogate, seed)]
+    found = [with_media(solution.stack) for solution in _first(wanted, starts, chosen.surrogate, seed)]
     if table.directions.brushed:
         turned = [_brushed(stack, angle) for stack in found for angle in BRUSHED]
         found = _closest(table, turned, chosen, wanted.eta_max, starts)
@@ -293,7 +293,7 @@ def _colour(medium: Medium, key: str) -> Any:
     return declared.reduced(value) if isinstance(value, Measured) else value
 
 
-def _with_media(stack: Stack) -> Stack:
+def with_media(stack: Stack) -> Stack:
     """The stack with a medium, clear if there was none, between all of its interfaces, and none above them."""
     first = next(n for n, layer in enumerate(stack.layers) if layer.surface)
     return _of_some(stack.with_layers(stack.layers[first:]), range(len(stack.interfaces)))

@@ -11,6 +11,7 @@ import numpy as np
 from pydantic import model_validator
 
 from velatura.errors import InvalidInput, within
+from velatura.inverse.wishes import KINDS, Body, FilmColour, Grazing, Passed, Wish, Wished
 from velatura.model.roughness_maps import MAPS, RoughnessMap
 from velatura.model.variance import Covariance, Isotropic, PerAxis, Roughness, Variance
 from velatura.stack import RGB, Mix, Stack, io, single
@@ -228,6 +229,10 @@ class Target(Record):
     ] = None
     lobes: tuple[TargetLobe, ...]
     start: Annotated[Stack | None, Start("material that the search begins with, of as many interfaces")] = None
+    grazing: Annotated[tuple[Grazing, ...], Wished("at a second angle", record=Grazing)] = ()
+    passed: Annotated[tuple[Passed, ...], Wished("of what passes", record=Passed)] = ()
+    body: Annotated[tuple[Body, ...], Wished("of a diffuse base or a medium that scatters", record=Body)] = ()
+    film: Annotated[tuple[FilmColour, ...], Wished("of the colour of a film", record=FilmColour, most=1)] = ()
 
     def __init__(self, /, lobes: Iterable[TargetLobe | Mapping[str, Any]] = (), **options: Any) -> None:
         if isinstance(lobes, str | Mapping) or not isinstance(lobes, Iterable):
@@ -236,16 +241,25 @@ class Target(Record):
 
     @model_validator(mode="after")
     def _lobes_fit_together(self) -> Target:
-        if not self.lobes:
-            raise ValueError("lobes: must hold at least one lobe")
+        if not self.lobes and not (self.further and self.start):
+            other = "; without any, write a start" if self.further else f", or {', '.join(KINDS)} with a start"
+            raise ValueError(f"lobes: must hold at least one lobe{other}")
         for n, lobe in enumerate(self.lobes[:-1], 1):
             if lobe.base != "dielectric":
                 raise ValueError(f"lobe {n}: base: only the last lobe may have a {lobe.base}, nothing lies below it")
+        for wish in self.grazing if self.lobes else ():
+            if wish.lobe is not None and wish.lobe > len(self.lobes):
+                raise ValueError(f"grazing: lobe: the target has {len(self.lobes)}, got {wish.lobe}")
         wanted = sum(lobe.interfaces for lobe in self.lobes)
-        if self.start is not None and len(self.start.interfaces) != wanted:
+        if self.lobes and self.start is not None and len(self.start.interfaces) != wanted:
             found = len(self.start.interfaces)
             raise ValueError(f"start: must have as many interfaces as the lobes, {wanted}, got {found}")
         return self
+
+    @property
+    def further(self) -> tuple[Wish, ...]:
+        """Wishes beyond lobes at normal incidence."""
+        return tuple(wish for key in KINDS for wish in getattr(self, key))
 
     @property
     def kind(self) -> type[Variance]:

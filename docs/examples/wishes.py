@@ -1,0 +1,67 @@
+"""
+Wishes beyond lobes
+===================
+
+What a pane passes, the colour of paint under a coat, the colour of an oxide, and the look at grazing angles: each wish
+changes the values that it is about, and the picture shows what was asked for beside what the stack has.
+"""
+
+import matplotlib.pyplot as plt
+import numpy as np
+
+import velatura as vt
+
+PANE = vt.Stack([vt.Interface(eta=1.5, alpha=0.02), vt.Medium(depth=1), vt.Interface(eta=1, alpha=0.02)])
+PLASTIC = vt.preset("glossy-plastic")
+TITANIUM = vt.Interface(eta=[2.74, 2.54, 2.27], k=[3.81, 3.43, 3.04], films=[vt.Film(eta=2.4, thickness_nm=50)])
+PAIR = [{"energy": 0.15, "alpha": 0.1, "interfaces": 2}]
+
+
+def shown(energy):
+    """The sRGB colour of an energy."""
+    return np.clip(np.broadcast_to(energy, 3), 0, 1) ** (1 / 2.2)
+
+
+def swatches(ax, title, found):
+    """The colour that was asked for, above that which the stack has."""
+    (wish,), (has,) = found.target.further, found.reached.further
+    rows = [shown(each.energy) for each in (wish, has)]
+    ax.imshow(np.array(rows)[:, None], extent=(0, 1, 0, 1), aspect="auto")
+    ax.set(title=title, xticks=[], yticks=[0.75, 0.25], yticklabels=["asked", "has"])
+
+
+figure, axes = plt.subplots(2, 2, figsize=(8, 4.6), layout="constrained")
+
+# %%
+# A pane and its tint and haze, and the colour of paint as it is seen through its coat.
+
+tinted = vt.inverse.answer({"start": PANE, "passed": {"energy": [0.15, 0.45, 0.55], "haze": 0.8}})
+painted = vt.inverse.answer({"start": PLASTIC, "body": {"energy": [0.03, 0.12, 0.4]}})
+swatches(axes[0, 0], f"passes a tint, haze {tinted.reached.passed[0].haze:.2f}", tinted)
+swatches(axes[0, 1], "paint under its coat", painted)
+
+# %%
+# The colour of an oxide by its thickness, and the thicknesses whose colours are nearest to a blue.
+
+blue = {"start": vt.Stack([TITANIUM]), "film": {"energy": [0.1, 0.2, 0.45], "thickest_nm": 400}}
+found = vt.inverse.answers(blue, 2, "weier2020")
+thickness = np.arange(0, 401, 5)
+colours = [
+    shown(vt.lobes(found[0].stack.replace(layer0_film0_thickness_nm=nm), 1.0, model="weier2020").energy[0][:, 0])
+    for nm in thickness
+]
+axes[1, 0].imshow(np.array(colours)[None], extent=(0, 400, 0, 1), aspect="auto")
+for each in found:
+    axes[1, 0].axvline(each.stack.flat()["layer0_film0_thickness_nm"], color="white", linestyle="--")
+axes[1, 0].set(title="the nearest blues of an oxide", xlabel="thickness, nm", yticks=[])
+
+# %%
+# Two stacks with one lobe at normal incidence, of which one is brighter at 75 degrees.
+
+angles = np.arange(0, 86, 2)
+for energy in (0.22, 0.27):
+    stack = vt.inverse.answer({"lobes": PAIR, "grazing": {"energy": energy}}, "bati2021").stack
+    lobes = vt.lobes(stack, np.cos(np.radians(angles)), model="bati2021")
+    (line,) = axes[1, 1].plot(angles, np.sum(lobes.energy, axis=0)[1])
+    axes[1, 1].plot(75, energy, "o", color=line.get_color())
+axes[1, 1].set(title="the same lobe, other energies at 75°", xlabel="angle of incidence", ylabel="reflected")

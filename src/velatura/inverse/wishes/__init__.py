@@ -1,0 +1,11 @@
+"""Wishes beyond lobes at normal incidence: each kind a file, and `KINDS`, by their keys in a target."""
+
+from velatura.inverse.wishes.body import Body
+from velatura.inverse.wishes.film import FilmColour
+from velatura.inverse.wishes.grazing import Grazing
+from velatura.inverse.wishes.passed import Passed
+from velatura.inverse.wishes.wish import Lacking, Wish, Wished
+
+KINDS: dict[str, type[Wish]] = {"grazing": Grazing, "passed": Passed, "body": Body, "film": FilmColour}
+
+__all__ = ["KINDS", "Body", "FilmColour", "Grazing", "Lacking", "Passed", "Wish", "Wished"]

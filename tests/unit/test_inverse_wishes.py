@@ -1,0 +1,173 @@
+"""Wishes beyond lobes at normal incidence.
+
+Truth: limits that have formulas, brute searches, and the model's own reading of the answer; `benchmarks/wishes.py`
+holds answers against random walks.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+
+import velatura as vt
+from velatura.inverse import Infeasible, Target, answer, answers, invert_stack
+from velatura.inverse.wishes import KINDS
+from velatura.inverse.wishes.passed import haze, roughness
+from velatura.inverse.wishes.wish import compared
+from velatura.stack import Diffuse, Interface, Medium, Stack
+from velatura.stack.values import Film
+
+PANE = Stack([Interface(eta=1.5, alpha=0.1), Medium(depth=1.0, sigma_a=0.1), Interface(eta=1.0, alpha=0.1)])
+CLEAR = Stack([PANE.layers[0], PANE.layers[2]])
+PLASTIC = Stack([Interface(eta="polystyrene", alpha=0.1), Diffuse(albedo=0.5)])
+COATED = Stack([Interface(eta=1.5, alpha=0.1), Medium(sigma_a=0.1), Interface(eta=1.5, k=3.0, alpha=0.2)])
+OXIDE = Stack([Interface(eta=(2.7, 2.5, 2.2), k=(3.8, 3.4, 3.0), films=(Film(eta=2.4, thickness_nm=50.0),))])
+PAIR = [{"energy": 0.15, "alpha": 0.1, "interfaces": 2}]
+
+#: A wish that can be met of each kind, and the keys of values that may change for it.
+WISHES: dict[str, tuple[dict[str, Any], set[str]]] = {
+    "grazing": ({"lobes": PAIR, "grazing": {"energy": 0.25}}, set()),
+    "passed": ({"start": PANE, "passed": {"energy": (0.5, 0.3, 0.6), "haze": 0.7}}, {"sigma_a", "alpha_u", "alpha_v"}),
+    "body": ({"start": PLASTIC, "body": {"energy": (0.2, 0.05, 0.3)}}, {"albedo"}),
+    "film": ({"start": OXIDE, "film": {"energy": (0.3, 0.2, 0.1), "thickest_nm": 200.0}}, {"film0_thickness_nm"}),
+}
+
+
+@pytest.mark.parametrize("model", ["velatura", "bati2021"])
+@pytest.mark.parametrize("kind", [kind for kind in KINDS if kind != "film"])
+def test_the_answer_has_what_is_asked_for(kind: str, model: str) -> None:
+    """Expected: what the model reads of the stack is the wish; lobes are those that were asked for."""
+    target = Target(**WISHES[kind][0])
+    found = answer(target, model)
+    assert found.met
+    for wish, has in zip(target.further, found.reached.further):
+        assert has.goal == pytest.approx(wish.goal, abs=1e-3)
+    for lobe, own in zip(target.lobes, found.reached.lobes):
+        assert own.colour == pytest.approx(lobe.colour, rel=1e-3)
+        assert own.axes == pytest.approx(lobe.axes, abs=1e-3)
+
+
+@pytest.mark.parametrize("kind", [kind for kind, (wish, _) in WISHES.items() if "start" in wish])
+def test_what_no_wish_is_about_stays(kind: str) -> None:
+    """Expected: other values are those of the present material, by name where they had one."""
+    wish, moving = WISHES[kind]
+    start, found = wish["start"], answer(wish, "weier2020").stack
+    changed = {key.partition("_")[2] for key, value in found.flat().items() if value != start.flat()[key]}
+    assert changed and changed <= moving
+
+
+def test_a_base_alone_has_the_albedo_that_is_seen() -> None:
+    """The limit: nothing lies above it."""
+    found = answer({"start": Stack([Diffuse(albedo=0.9)]), "body": {"energy": (0.1, 0.3, 0.8)}}).stack
+    assert found.flat()["layer0_albedo"] == pytest.approx((0.1, 0.3, 0.8), abs=1e-4)
+
+
+def test_a_medium_without_interfaces_passes_light_by_its_depth() -> None:
+    """The limit: an index of 1 reflects nothing, and of light at 60 degrees exp(-2 sigma_a) passes."""
+    slab = Stack([Interface(eta=1.0), Medium(depth=1.0, sigma_a=0.1), Interface(eta=1.0)])
+    found = answer({"start": slab, "passed": {"energy": (0.5, 0.2, 0.9), "angle": 60}}).stack
+    assert found.flat()["layer1_sigma_a"] == pytest.approx(tuple(-0.5 * np.log([0.5, 0.2, 0.9])), abs=1e-4)
+
+
+def test_haze_is_the_share_of_a_lobe_beyond_two_and_a_half_degrees() -> None:
+    """Truth: facets with GGX slopes, of which half-vectors tilted by t turn light by 2 t."""
+    tilt = np.linspace(0, np.pi / 2, 400_001)[:-1]
+    for alpha in (0.01, 0.05, 0.3):
+        ggx = alpha**2 / (np.pi * np.cos(tilt) ** 4 * (alpha**2 + np.tan(tilt) ** 2) ** 2)
+        share = 2 * np.pi * ggx * np.cos(tilt) * np.sin(tilt)
+        beyond = np.trapezoid(np.where(tilt > np.radians(1.25), share, 0), tilt) / np.trapezoid(share, tilt)
+        assert haze(alpha) == pytest.approx(beyond, abs=1e-4)
+        assert roughness(haze(alpha)) == pytest.approx(alpha)
+
+
+def test_no_other_thickness_has_a_nearer_colour() -> None:
+    """Truth: all thicknesses in steps of 7 nm. Expected also: others are nearer than those beside them."""
+    wish = Target(start=OXIDE, film={"energy": (0.1, 0.3, 0.25), "thickest_nm": 400.0})
+
+    def missed(nm: float) -> float:
+        seen = vt.lobes(OXIDE.replace(layer0_film0_thickness_nm=nm), 1.0, model="weier2020")
+        return float(np.linalg.norm(compared(seen.energy[0][:, 0], None) - wish.further[0].goal))
+
+    found = answers(wish, 2, "weier2020")
+    first, *others = (each.stack.flat()["layer0_film0_thickness_nm"] for each in found)
+    brute = min(missed(float(nm)) for nm in range(1, 401, 7))
+    assert missed(first) <= brute + 1e-6
+    assert len(others) == 1
+    for nm in others:
+        assert missed(first) <= missed(nm) <= min(missed(nm - 2), missed(min(nm + 2, 400)))
+
+
+def test_a_thickness_stays_below_its_bound() -> None:
+    found = answer(Target(start=OXIDE, film={"energy": (0.1, 0.3, 0.25), "thickest_nm": 40.0}), "weier2020")
+    assert 1 <= found.stack.flat()["layer0_film0_thickness_nm"] <= 40
+
+
+def test_a_wish_at_grazing_keeps_the_lobes_of_the_present_material() -> None:
+    """Expected: less energy there, by a metal of another tint, and the same lobes."""
+    found = answer({"start": COATED, "grazing": {"energy": 0.42, "angle": 70}}, "bati2021")
+    before, after = (vt.lobes(stack, 1.0, model="bati2021") for stack in (COATED, found.stack))
+    assert np.allclose(before.energy, after.energy, atol=1e-3)
+    assert np.allclose(before.alpha, after.alpha, atol=2e-3)
+
+
+@pytest.mark.parametrize(
+    ("wish", "why"),
+    [
+        ({"start": CLEAR, "passed": {"energy": 0.5}}, "passed: no medium absorbs"),
+        ({"start": CLEAR, "body": {"energy": 0.2}}, "body: no medium scatters"),
+        ({"start": COATED, "film": {"energy": 0.2, "thickest_nm": 100.0}}, "film: no interface has films"),
+        ({"start": PANE, "passed": {"energy": 0.99}}, "no stack of these layers is found that has passed energy 0.99"),
+        (
+            {"start": COATED, "grazing": {"energy": 0.9}},
+            "no stack of these layers with its lobes is found that has graz",
+        ),
+    ],
+)
+def test_what_cannot_be_is_refused_with_a_way_out_that_can(wish: dict[str, Any], why: str) -> None:
+    with pytest.raises(Infeasible) as caught:
+        answer(wish, "bati2021")
+    assert caught.value.why.startswith(why)
+    assert answer(caught.value.directions[0].target.to_dict(), "bati2021").stack.layers
+
+
+@pytest.mark.parametrize(
+    ("wish", "words"),
+    [
+        ({"start": COATED, "passed": {"energy": 0.2}}, "passed: layer 2 (conductor) is opaque; end the stack"),
+        ({"start": COATED, "body": {"energy": 0.2}}, "body: no medium scatters, and layer 2 (conductor) is no diffuse"),
+        ({"start": COATED, "grazing": {"energy": 0.2, "lobe": 3}}, "grazing: lobe: the material has 2, got 3"),
+        ({"lobes": PAIR, "grazing": {"energy": 0.2, "lobe": 2}}, "grazing: lobe: the target has 1, got 2"),
+        ({"start": COATED, "grazing": {"alpha": 0.2}}, "grazing: alpha: is of one lobe; write lobe"),
+        ({"start": PANE, "passed": {}}, "passed: must ask for energy or alpha or haze"),
+        ({"start": PANE, "passed": {"alpha": 0.1, "haze": 0.1}}, "passed: haze: not together with alpha"),
+        ({"start": PANE, "passed": {"haze": 0.1, "angle": 10}}, "passed: haze: is that at normal incidence"),
+        ({"start": PANE, "passed": {"energy": 1.5}}, "passed: energy: must lie in 0 to 1, got 1.5"),
+        ({"start": PANE, "passed": [{"energy": 0.5}] * 5}, "passed: must be a mapping of angle, energy, alpha, haze"),
+        (
+            {"start": OXIDE, "film": [{"energy": 0.5}] * 2},
+            "film: must be a mapping of angle, energy, layer, film, thick",
+        ),
+        ({"start": PANE, "passed": {"colour": 1}}, "passed: unknown key 'colour'"),
+        ({"passed": {"energy": 0.5}}, "lobes: must hold at least one lobe; without any, write a start"),
+        ({}, "lobes: must hold at least one lobe, or grazing, passed, body, film with a start"),
+    ],
+)
+def test_what_is_no_wish_is_refused_in_one_line(wish: dict[str, Any], words: str) -> None:
+    with pytest.raises(vt.InvalidInput) as caught:
+        answer(wish, "bati2021")
+    assert str(caught.value).startswith(words) and "\n" not in str(caught.value)
+
+
+def test_a_wish_is_read_as_it_is_written() -> None:
+    for wish, _ in WISHES.values():
+        target = Target(**wish)
+        assert Target.from_dict(target.to_dict()) == target
+
+
+def test_a_search_for_lobes_alone_takes_no_other_wish() -> None:
+    with pytest.raises(vt.InvalidInput, match="passed: is no wish for lobes; velatura invert"):
+        invert_stack(WISHES["passed"][0], "bati2021")
+    found = answer(PAIR, "bati2021")
+    assert found.met and found.stack == invert_stack(PAIR, "bati2021").stack
