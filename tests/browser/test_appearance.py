@@ -633,3 +633,65 @@ def test_the_truth_beside_the_model(visit: Open) -> None:
     assert 0 < float(np.mean(np.abs(truth - alike)[:, 34:])) < 20
     page.page.get_by_label("Compare").select_option("single")
     assert page.page.evaluate("velatura.viewport.truth") is None
+
+
+def test_further_wishes_are_dragged(visit: Open) -> None:
+    """Expected: the material shows, by Python, what the controls were dragged to, in one step each; a clear pane gets
+    its medium by one click; the reason for what cannot be stands beside it."""
+    page = visit()
+    page.page.evaluate("void (velatura.viewport.thumbnail = () => new Promise(() => {}))")
+
+    def further(title: str) -> Any:
+        open_material(page, title)
+        page.page.get_by_role("tab", name="Appearance").click()
+        found = page.page.locator("details.further")
+        found.wait_for()
+        if not found.evaluate("details => details.open"):
+            found.locator("summary").click()
+        return found
+
+    def drag(slider: Any, ticks: tuple[int, ...]) -> None:
+        before = steps(page)
+        for tick in ticks:
+            slider.fill(str(tick))
+        answered(page)
+        assert steps(page) == before + 1
+
+    # What a pane passes, by its haze
+    look = further("Tinted plate")
+    before = lobes(page)
+    haze = look.get_by_label("Haze, slider")
+    most = int(haze.get_attribute("max"))
+    drag(haze, (round(0.8 * most), round(0.5 * most)))
+    alpha = float(lobes(page).transmitted.alpha.mean())
+    assert alpha**2 / (alpha**2 + np.tan(np.radians(1.25)) ** 2) == pytest.approx(0.5, abs=2e-3)
+    assert page.state("layers.1.keys.sigma_a") == pytest.approx([1.0, 0.7, 0.2])
+    assert before.transmitted.alpha.mean() > 2 * alpha
+
+    # A clear pane, which lacks a medium
+    look = further("Frosted glass pane")
+    look.get_by_role("button", name="Add a tinted medium below layer 0").click()
+    drag(look.get_by_label("Passes: share, slider"), (round(0.6 * most), round(0.4 * most)))
+    assert float(lobes(page).passed.mean()) == pytest.approx(0.4, abs=2e-3)
+
+    # The colour of a base
+    look = further("Glossy plastic")
+    look.get_by_label("Base, seen from outside, blue", exact=True).fill("0.2")
+    look.get_by_label("Base, seen from outside, blue", exact=True).press("Enter")
+    answered(page)
+    assert lobes(page).remainder[2, 0] == pytest.approx(0.2, abs=1e-3)
+    assert page.state("layers.0.keys.eta") == "polystyrene"
+
+    # Grazing light: more than there can be
+    look.get_by_label("Reflected at a second angle: share", exact=True).fill("0.99")
+    look.get_by_label("Reflected at a second angle: share", exact=True).press("Enter")
+    look.get_by_text("No stack of these layers with its lobes is found").wait_for()
+    answered(page)
+
+    # A film
+    page.page.locator("details.section > summary", has_text="Model").click()
+    page.page.get_by_label("Model", exact=True).select_option("weier2020")
+    look = further("Anodised titanium")
+    thickness = page.state("layers.0.keys.films.0.thickness_nm")
+    drag(look.get_by_label("Film, by its thickness: share, slider"), (round(0.3 * most), round(0.4 * most)))
+    assert page.state("layers.0.keys.films.0.thickness_nm") != pytest.approx(thickness, abs=1)

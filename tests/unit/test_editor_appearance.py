@@ -12,6 +12,7 @@ import pytest
 
 import velatura as vt
 from velatura.editor import appearance, class_maps
+from velatura.editor.service import VERBS
 from velatura.errors import InvalidInput
 from velatura.inverse import Target, invert
 from velatura.inverse.coats import scattered
@@ -774,3 +775,35 @@ def test_a_wrong_depth_is_one_line(name: str, depths: dict[str, Any], says: str)
     with pytest.raises(InvalidInput) as error:
         class_maps.member({**body, "depths": depths})
     assert str(error.value).startswith(says)
+
+
+# Wishes beyond lobes -------------------------------------------------------------------------------------------------
+
+
+def test_a_wish_is_answered_from_the_material_that_it_began_with() -> None:
+    """Expected: what the material shows is what was asked for, coarsely too, and a reason where it cannot be."""
+    plate = vt.preset("tinted-plate").to_dict()
+    body = {"material": plate, "model": "bati2021", "target": {"passed": {"energy": [0.5, 0.3, 0.2]}}}
+    for coarse in (True, False):
+        answer = VERBS["wish"]({**body, "coarse": coarse})
+        assert answer["snapped"] is None
+        passed = next(each for each in answer["wishes"] if each["key"] == "passed")
+        assert passed["energy"] == pytest.approx([0.5, 0.3, 0.2], abs=2e-3)
+    answer = VERBS["wish"]({**body, "target": {"passed": {"energy": 0.99}}})
+    assert answer["snapped"].startswith("no stack of these layers is found that has passed energy 0.99")
+    assert vt.Stack.from_dict(answer["material"]).flat()["layer1_sigma_a"] == pytest.approx(0, abs=1e-6)
+
+
+def test_a_material_states_what_it_lacks_for_a_wish() -> None:
+    """Expected: for a clear pane its haze, and a medium; the way adds what is lacking, which is no more after it."""
+    pane = {"layers": [{"interface": {"eta": 1.5, "alpha": 0.1}}, {"interface": {"eta": 1.0}}]}
+    found = {each["key"]: each for each in VERBS["wishes"]({"material": pane, "model": "bati2021"})["wishes"]}
+    assert set(found) == {"grazing", "passed", "body", "film"}
+    assert found["passed"]["haze"] > 0 and found["passed"]["way"] == "a tinted medium below layer 0"
+    for key in ("passed", "body", "film"):
+        other = VERBS["wishes"]({"material": found[key]["material"], "model": "bati2021"})["wishes"]
+        assert not [each for each in other if each["key"] == key and "lacks" in each]
+    metal = {"layers": [{"interface": {"conductor": "Cu"}}]}
+    assert {each["key"] for each in VERBS["wishes"]({"material": metal, "angle": 60})["wishes"]} == {"grazing", "film"}
+    with pytest.raises(InvalidInput, match="angle: must lie in 0 to 89"):
+        VERBS["wishes"]({"material": metal, "angle": 90})

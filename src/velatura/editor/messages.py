@@ -19,6 +19,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from velatura.errors import InvalidInput
+from velatura.inverse.wishes.wish import STEEPEST
 from velatura.model import DEFAULT, Model, named
 from velatura.stack import Described, Stack, dumps, single
 from velatura.stack.mix import MOST, from_dict
@@ -196,7 +197,8 @@ KEYS: dict[str, Parameter] = {
     "read": Fields("of the lobes that a material has", entries="lobes", most=LOBES),
     "model": Words("of a model"),
     "switches": Fields("of the model"),
-    "coarse": Flag("directions"),
+    "coarse": Flag("directions, and searches"),
+    "angle": Scalar("of a second look, degrees", low=0, high=STEEPEST, texturable=False),
     "lobe": Whole("which lobe of the target", high=LOBES - 1),
     "layer": Whole("which layer of the material", high=LAYERS - 1),
     "film": Whole("which film of the layer", high=Films.most - 1),

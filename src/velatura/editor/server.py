@@ -45,8 +45,8 @@ BODY_TIME, ANSWER_TIME = 60, 60  # seconds for the body of a request, and for it
 LANES = {"quick": (4, 512), "picture": (2, 64), "slow": (4, 32)}
 SPARE = 4  # threads of a kind beside these, for answers that were given up, which go on until they end
 LANE_OF = {
-    **dict.fromkeys(("shader", "values", "appearance"), "picture"),
-    **dict.fromkeys(("invert", "ways", "class", "member", "coat", "targets"), "slow"),
+    **dict.fromkeys(("shader", "values", "appearance", "wishes"), "picture"),
+    **dict.fromkeys(("invert", "ways", "wish", "class", "member", "coat", "targets"), "slow"),
     **dict.fromkeys(("truth", "validation", "film", "export"), "slow"),
 }
 

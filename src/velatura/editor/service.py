@@ -16,7 +16,7 @@ from numpy.typing import ArrayLike
 from pydantic.fields import FieldInfo
 
 from velatura import exports, kernel
-from velatura.editor import appearance, class_maps, films, truth, validations
+from velatura.editor import appearance, class_maps, films, truth, validations, wishes
 from velatura.editor.messages import (
     Answer,
     Body,
@@ -327,6 +327,7 @@ _VERBS: dict[str, Verb] = {
     **films.VERBS,
     **validations.VERBS,
     **appearance.VERBS,
+    **wishes.VERBS,
     **class_maps.VERBS,
     **truth.VERBS,
 }

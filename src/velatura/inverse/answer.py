@@ -111,7 +111,7 @@ def answers(
         return [Answer(one.stack, wanted, chosen, 0.0) for one in alternatives(wanted, count, chosen, seed)]
     found = nearest_answers(wanted, count, chosen, seed)
     if not found[0].met and not wanted.film:
-        raise _refused(found[0])
+        raise refused(found[0])
     return [each for each in found if each.met or wanted.film]
 
 
@@ -167,7 +167,7 @@ def _held(wanted: Target, stack: Stack, model: Model) -> Target:
     return wanted.model_copy(update={"lobes": tuple(lobes)})
 
 
-def _refused(found: Answer) -> Infeasible:
+def refused(found: Answer) -> Infeasible:
     """The refusal of a wish, with the nearest stack as its way out."""
     pairs = zip(found.target.further, found.reached.further)
     off = [(float(np.abs(wish.goal - has.goal).max()), wish, has) for wish, has in pairs]

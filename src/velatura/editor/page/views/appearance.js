@@ -9,6 +9,7 @@ import { createClass } from './appearance/class.js';
 import { described, handles } from './appearance/handles.js';
 import { about, axesOf, blurOf, changed, hue, withBlur, withMean } from './appearance/looks.js';
 import { asker, oneAtATime } from './appearance/questions.js';
+import { createWishes } from './appearance/wishes.js';
 import { colourRow, hex } from './colour.js';
 import { capital, dial, iconButton, menu, number, styles } from './controls.js';
 import { mean, shown } from './plots/scale.js';
@@ -64,6 +65,7 @@ export function mountAppearance(element, services) {
 
   /** Reads the material anew where it is another one. */
   async function follow() {
+    if (element.checkVisibility()) further.follow();
     if (!element.checkVisibility() || now() === text) return paint();
     text = now();
     [asked, origin, ways, coatLobe, coatSays] = [null, null, null, null, ''];
@@ -195,6 +197,8 @@ export function mountAppearance(element, services) {
     held: () => held || wishes.busy,
   });
 
+  const further = createWishes(services, { ask, question, paint });
+
   function choose(index) {
     if (index === chosen) return;
     [chosen, unlocked] = [index, null];
@@ -213,7 +217,7 @@ export function mountAppearance(element, services) {
 
   const panel = () => html`<section class="appearance" aria-label="Appearance">
     ${ofPart(chosenPart(store.get()))} ${read.says ? html`<p class="says">${saying()}</p>` : nothing} ${read.target ? lobes() : nothing}
-    ${read.target && !read.says ? [theClass(), theCoat()] : nothing}
+    ${further.view()} ${read.target && !read.says ? [theClass(), theCoat()] : nothing}
     <div class="actions">
       <button type="button" @click=${pin} title="Keep this one on the right of the picture, to compare others with it">
         Pin as B
@@ -441,7 +445,7 @@ export function mountAppearance(element, services) {
     follow,
     /** Whether nothing is asked for, and nothing under the hand. */
     get quiet() {
-      return !held && !wishes.busy && !reading;
+      return !held && !wishes.busy && !reading && !further.busy;
     },
     /** Stores the target of a material by a model in advance. */
     know: (material, model, answer) => known.set(textOf(material, { model, switches: {} }), { says: null, ...answer }),

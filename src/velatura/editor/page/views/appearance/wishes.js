@@ -1,0 +1,168 @@
+// Wishes beyond lobes: what is reflected at a second angle, what passes, and the colours of a base and of a film.
+
+import { html, nothing } from 'lit-html';
+import { setAppearance } from '../../state/commands.js';
+import { stackOf } from '../../state/material.js';
+import { colourRow } from '../colour.js';
+import { capital, number } from '../controls.js';
+import { mean } from '../plots/scale.js';
+import { line } from '../settings.js';
+import { withMean } from './looks.js';
+import { oneAtATime } from './questions.js';
+
+const TITLES = {
+  grazing: 'Reflected at a second angle',
+  passed: 'Passes',
+  body: 'Base, seen from outside',
+  film: 'Film, by its thickness',
+};
+const STEEPEST = { low: 0, high: 89, strict: false };
+const SHARE = { low: 0, high: 1, strict: false };
+const HAZE = { low: 0, high: 0.9995, strict: false };
+const DARKEST = 1e-6; // mean energy that a hand can ask for
+
+const rounded = (value) => Number(value.toPrecision(4));
+
+/**
+ * @param {{store, call, edits, messages}} services
+ * @param {{question: function, ask: function, paint: function}} panel what the panel around knows and does
+ */
+export function createWishes({ store, call, edits, messages }, panel) {
+  let read = []; // what the material shows of each wish: {key, energy, haze}, or lacks for it: {lacks, way, material}
+  let text = ''; // what was asked about
+  let angle = 75;
+  let origin = null; // material that the wishes of a step start from
+  let asked = null; // {key, wish}, where it could not be had, or not yet
+  let refused = null; // why it could not
+  let held = false;
+  let rough = null; // wish whose answer is approximate
+
+  const textNow = () => JSON.stringify({ ...panel.question(), angle });
+
+  /** Reads the material anew where it is another one. */
+  async function follow() {
+    if (held || wishes.busy || textNow() === text) return;
+    const own = textNow();
+    [text, asked, refused] = [own, null, null];
+    try {
+      const answer = await panel.ask('wishes', { ...panel.question(), angle });
+      if (answer && own === text) read = answer.wishes;
+    } catch {
+      if (own === text) read = []; // the panel says why it has no lobes
+    }
+    panel.paint();
+  }
+
+  const wishes = oneAtATime(
+    async (wanted) => {
+      const coarse = held;
+      const body = { ...panel.question(), material: origin, target: { [wanted.key]: wanted.wish }, angle, coarse };
+      try {
+        const answer = (await panel.ask('wish', body)) ?? (held ? null : await call('wish', body)); // what rests is answered
+        if (!answer) return;
+        rough = coarse ? wanted : null;
+        accept(answer);
+        messages.forgive('appearance');
+      } catch (error) {
+        messages.fail('appearance', error);
+      }
+    },
+    () => held || comeToRest(),
+  );
+
+  function accept({ material, wishes: shown, snapped, why }) {
+    refused = snapped ?? why ?? null;
+    if (material) {
+      read = shown;
+      edits.drag('appearance', setAppearance, material);
+      text = textNow();
+    }
+    panel.paint();
+  }
+
+  /** Asks again for what was answered approximately; then ends the step. */
+  function comeToRest() {
+    if (rough) {
+      const wanted = rough;
+      rough = null;
+      return wishes.want(wanted);
+    }
+    if (!refused) asked = null;
+    origin = null;
+    edits.settle();
+    panel.paint();
+  }
+
+  /** Requests changes of a wish; those that the same drag has asked for remain. */
+  function want(key, changes) {
+    origin ??= stackOf(store.get());
+    const before = asked?.key === key ? asked.wish : key === 'grazing' ? { angle } : {};
+    asked = { key, wish: { ...before, ...changes } };
+    held = true;
+    wishes.want(asked);
+    panel.paint();
+  }
+
+  function letGo() {
+    held = false;
+    if (!wishes.busy) comeToRest();
+  }
+
+  const refuse = (words) => messages.complain('appearance', words, { passing: true });
+
+  const edit = (key, changesOf) => ({
+    move: (value) => want(key, changesOf(value)),
+    set: (value) => {
+      want(key, changesOf(value));
+      letGo();
+    },
+    settle: letGo,
+    refuse,
+  });
+
+  /** A wish as it is asked for while it is held, else as the material has it. */
+  const underHand = (shown) => (held && asked?.key === shown.key ? { ...shown, ...asked.wish } : shown);
+
+  function row(shown) {
+    const { key, energy, haze } = underHand(shown);
+    const title = TITLES[key];
+    const toMean = (value) => ({ energy: withMean(energy, Math.max(value, DARKEST)).map(rounded) });
+    const toHaze = (value) => ({ haze: rounded(value) });
+    const tint = () => [
+      line('Colour', colourRow({ label: title, value: energy, spec: SHARE, edit: edit(key, (value) => ({ energy: value })) })),
+      line('Energy', number({ label: `${title}: share`, value: rounded(mean(energy)), spec: SHARE, edit: edit(key, toMean) })),
+    ];
+    return html`<fieldset>
+      <legend>${title}</legend>
+      ${key === 'grazing' ? line('Angle', number({ label: 'Second angle', value: angle, spec: STEEPEST, edit: ofAngle })) : nothing}
+      ${shown.lacks ? lacking(shown) : tint()}
+      ${haze === undefined ? nothing : line('Haze', number({ label: 'Haze', value: rounded(haze), spec: HAZE, edit: edit(key, toHaze) }))}
+      ${refused && asked?.key === key ? html`<p class="refused">${capital(refused)}.</p>` : nothing}
+    </fieldset>`;
+  }
+
+  const turn = (value) => {
+    angle = Math.round(10 * value) / 10;
+    follow();
+  };
+  const ofAngle = { move: turn, set: turn, settle() {}, refuse };
+
+  const lacking = ({ lacks, way, material }) => html`<p class="faint">
+    ${capital(lacks)}.
+    <button type="button" @click=${() => store.run(setAppearance, material)}>Add ${way}</button>
+  </p>`;
+
+  return {
+    follow,
+    view: () =>
+      read.length
+        ? html`<details class="part further">
+            <summary>Further wishes</summary>
+            ${read.map(row)}
+          </details>`
+        : nothing,
+    get busy() {
+      return held || wishes.busy;
+    },
+  };
+}

@@ -1,0 +1,57 @@
+"""The wishes of the Appearance panel that are beyond lobes: what a material shows of each, and the answer to one."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from velatura.editor.messages import Answer, Body, Verb, document, field, model_of, stack_of
+from velatura.inverse import Infeasible, Target
+from velatura.inverse.answer import nearest_answers, refused
+from velatura.inverse.wishes import KINDS
+from velatura.model import Model
+from velatura.model.registry import stack_lobes
+from velatura.stack import Stack
+
+ANGLE = 75.0  # of the second look
+TILTED, BLURRED = "grazing", "passed"  # seen at that angle, and with a blur that needs no absorption
+
+
+def wishes(body: Body) -> Answer:
+    """Every wish that a material may be asked for: what it shows of it, or what it lacks for it."""
+    return {"wishes": _shown(stack_of(body, "appearance"), model_of(body), body.get("angle", ANGLE))}
+
+
+def _shown(stack: Stack, model: Model, angle: float) -> list[Answer]:
+    seen, found = stack_lobes(stack, np.cos(np.radians([0.0, angle])), model=model), list[Answer]()
+    groups = [[k] for k in range(len(seen.energy))]
+    for key, kind in KINDS.items():
+        wish = kind(energy=0.5)
+        lacking, row = wish.lacking(stack), Answer(key=key)
+        if lacking and lacking.stack:
+            row |= {"lacks": lacking.why, "way": lacking.words, "material": document(lacking.stack)}
+        if lacking is None or (key == BLURRED and stack.transmits):
+            has: dict[str, Any] = wish.shown(seen, int(key == TILTED), groups)
+            row |= {**has, "energy": np.broadcast_to(has["energy"], 3).tolist()}
+        if len(row) > 1:
+            found.append(row)
+    return found
+
+
+def wish(body: Body) -> Answer:
+    """The nearest material to a wish under its key in `target`, from `material`, and what it shows; `snapped`: why the
+    wish is not met, or null. A `coarse` one takes fewer readings."""
+    stack, model = stack_of(body, "appearance"), model_of(body)
+    target = Target.from_dict({**field(body, "target", dict), "start": stack})
+    try:
+        found = nearest_answers(target, 1, model, quick=body.get("coarse", False))[0]
+    except Infeasible as error:
+        return {"why": error.why}
+    shown = _shown(found.stack, model, body.get("angle", ANGLE))
+    snapped = None if found.met or target.film else refused(found).why
+    return {"material": document(found.stack), "wishes": shown, "snapped": snapped}
+
+
+#: What `service.VERBS` takes over.
+VERBS: dict[str, Verb] = {"wishes": wishes, "wish": wish}
