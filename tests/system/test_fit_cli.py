@@ -58,6 +58,50 @@ def test_a_fit_says_what_the_table_determines(run: Run, folder: Path) -> None:
     assert "model_error" not in json.loads(run(*arguments, "--json", "--walks", "0")[1])
 
 
+def test_a_set_of_tables_is_fitted_once_each(run: Run, folder: Path) -> None:
+    """Expected: a material and a report for each table; one that fails is named, and the rest done; a table that is
+    known is not fitted again, but one that has changed is."""
+    tables = folder / "tables"
+    tables.mkdir()
+    for name in ("one", "two"):
+        (tables / f"{name}.csv").write_text((folder / "table.csv").read_text())
+    (tables / "bad.csv").write_text("theta_i,theta_o,phi,r,g,b\n95,0,0,1,1,1\n")
+    (tables / "notes.txt").write_text("no table")
+    arguments = ("fit", "tables", "target.yaml", "--model", "bati2021", "--starts", "1", "--walks", "0", "-o", "fits")
+    status, out, err = run(*arguments)
+    assert status == 1
+    assert err.startswith("velatura: tables/bad.csv: line 2") and err.count("\n") == 1
+    assert [line.partition(": error")[0] for line in out.splitlines()] == ["tables/one.csv", "tables/two.csv"]
+    assert sorted(path.name for path in (folder / "fits").iterdir()) == ["one.json", "one.yaml", "two.json", "two.yaml"]
+    assert vt.load("fits/two.yaml").interfaces[0].eta == pytest.approx(1.8, rel=1e-4)
+
+    (tables / "bad.csv").unlink()
+    changed = (tables / "two.csv").read_text().replace("30.0,", "31.0,")
+    (tables / "two.csv").write_text(changed)
+    status, out, err = run(*arguments)
+    assert (status, err) == (0, "")
+    assert [line.endswith("(known)") for line in out.splitlines()] == [True, False]
+    report = json.loads(run(*arguments, "--json")[1])
+    assert report["tables/one.csv"] == json.loads((folder / "fits" / "one.json").read_text())
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (("table.csv", "other.csv", "target.yaml"), "-o: needs a folder for the results of several tables"),
+        (("table.csv", "other.csv", "target.yaml", "-o", "found.yaml"), "-o found.yaml: needs a folder"),
+        (("empty", "target.yaml", "-o", "fits"), "empty: holds no table (.csv, .binary, .bsdf, .pbsdf, .astm)"),
+        (("table.csv", "empty/../sub/table.csv", "target.yaml", "-o", "fits"), "has the name of table.csv; fit them"),
+    ],
+)
+def test_a_set_that_cannot_be_is_refused(run: Run, folder: Path, arguments: tuple[str, ...], words: str) -> None:
+    (folder / "empty").mkdir()
+    status, out, err = run("fit", *arguments)
+    assert (status, out) == (2, "")
+    assert words in err and err.count("\n") == 1
+    assert not (folder / "fits").exists()
+
+
 def test_a_fit_is_kept_where_there_is_nothing_to_walk_with(
     run: Run, folder: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -4,17 +4,18 @@ from __future__ import annotations
 
 import json
 import sys
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
 from velatura.cli import invert, options, progress
-from velatura.errors import MissingTool
+from velatura.errors import InvalidInput, MissingTool
 
 if TYPE_CHECKING:
     from velatura.inverse import Fit, ModelError, ReflectanceTable
+    from velatura.inverse.fitting.fit_set import Entry
     from velatura.model import Model
     from velatura.stack import Described
 
@@ -24,13 +25,13 @@ MOST = 10  # pairs of parameters that are printed
 
 
 def fit(
-    table: Annotated[
-        str,
+    tables: Annotated[
+        list[str],
         typer.Argument(
-            metavar="TABLE",
+            metavar="TABLE...",
             help="CSV (theta_i,theta_o,phi,r,g,b or theta_i,phi_i,theta_o,phi_o,r,g,b, in degrees and 1/sr), "
             "or a measurement of MERL (.binary), RGL (_rgb.bsdf, _spec.bsdf), KAIST (.pbsdf), by ASTM E1392 (.astm), "
-            "or of Zemax (.bsdf).",
+            "or of Zemax (.bsdf); several, or a folder of them.",
         ),
     ],
     target: Annotated[
@@ -41,7 +42,12 @@ def fit(
         ),
     ],
     starts: Annotated[int, typer.Option(min=1, max=100, metavar="N", help="Stacks to descend from.")] = 4,
-    output: Output = None,
+    output: Annotated[
+        Path | None,
+        typer.Option(
+            "--output", "-o", metavar="F", help="The material (YAML or JSON); of several tables, a folder of results."
+        ),
+    ] = None,
     walks: Annotated[
         int,
         typer.Option(
@@ -56,6 +62,9 @@ def fit(
 ) -> None:
     """Find the stack closest to a table of reflectance over angles.
 
+    Several tables, or a folder of them, are fitted one after the other: each gets a material and a report (JSON) in the
+    folder -o, and is left as it is where it was fitted before; one that fails is named, and the others are done.
+
     Reports the interval of each parameter (95 %), the parameters of which one makes up for the other, other stacks
     that fit as well, and the error of the model itself beside random walks of the stack, below which no fit is known.
     """
@@ -63,6 +72,17 @@ def fit(
     from velatura import inverse
 
     wanted, name, switches = invert.read(target, model, settings)
+    if len(tables) > 1 or Path(tables[0]).is_dir():
+
+        def beside(found: Fit, rows: ReflectanceTable) -> ModelError | None:
+            return _beside_walks(found, rows, walks, seed)
+
+        made = inverse.fit_set(
+            tables, wanted, _folder(output), starts, name, seed, beside if walks else None, **switches
+        )
+        _set(made, output, plot, as_json)
+        return
+    (table,) = tables
     rows = inverse.load_table(table)
     check(output)
     picture = invert.picture(table) if plot else None
@@ -72,6 +92,37 @@ def fit(
     if picture:
         draw(rows, found, wanted.name or Path(table).name, picture)
     show(found, output, picture, as_json, own)
+
+
+def _folder(output: Path | None) -> Path:
+    """The folder of the results of several tables."""
+    if output is None or output.suffix.lower() in invert.ENDINGS or output.is_file():
+        raise InvalidInput(f"-o{f' {output}' if output else ''}: needs a folder for the results of several tables")
+    return output
+
+
+def _set(made: Iterable[Entry], folder: Path | None, plot: bool, as_json: bool) -> None:
+    """Print a line for each table of a set, draw its fit, and fail if one has none."""
+    reports, failed = dict[str, Any](), False
+    for each in made:
+        if each.report is None:
+            failed = True
+            where = "" if each.why.startswith(str(each.path)) else f"{each.path}: "
+            print(f"velatura: {where}{each.why}", file=sys.stderr)
+            continue
+        reports[str(each.path)] = each.report
+        if not as_json:
+            own = each.report.get("model_error")
+            beside = f", of the model itself {own['error']:.2g}" if own else ""
+            print(
+                f"{each.path}: error {each.report['error']:.2g}{beside}{'' if each.found else ' (known)'}", flush=True
+            )
+        if plot and each.found and each.table and folder:
+            draw(each.table, each.found, each.path.name, folder / f"{each.path.stem}.png")
+    if as_json:
+        print(json.dumps(reports, allow_nan=False))
+    if failed:
+        raise typer.Exit(1)
 
 
 def _beside_walks(found: Fit, rows: ReflectanceTable, walks: int, seed: int) -> ModelError | None:

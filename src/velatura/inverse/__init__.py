@@ -8,6 +8,7 @@ from velatura.inverse.answer import Answer, answer, answers
 from velatura.inverse.coats import Coated, coat
 from velatura.inverse.fitting.angles import Directions, ReflectanceTable, table_of
 from velatura.inverse.fitting.descent import Estimate, Fit, Other, fit
+from velatura.inverse.fitting.fit_set import fit_set
 from velatura.inverse.fitting.model_error import ModelError, model_error
 from velatura.inverse.fitting.simplify import MixtureFit, fit_target, simplify
 from velatura.inverse.invert import alternatives, grazing, invert_stack, on_black
@@ -57,6 +58,7 @@ __all__ = [
     "coat",
     "fit",
     "fit_pigment",
+    "fit_set",
     "fit_target",
     "grazing",
     "invert_interface",
