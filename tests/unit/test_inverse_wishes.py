@@ -99,9 +99,10 @@ def test_no_other_thickness_has_a_nearer_colour() -> None:
         assert missed(first) <= missed(nm) <= min(missed(nm - 2), missed(min(nm + 2, 400)))
 
 
-def test_a_thickness_stays_below_its_bound() -> None:
-    found = answer(Target(start=OXIDE, film={"energy": (0.1, 0.3, 0.25), "thickest_nm": 40.0}), "weier2020")
-    assert 1 <= found.stack.flat()["layer0_film0_thickness_nm"] <= 40
+def test_a_thickness_stays_within_its_bounds() -> None:
+    wish = {"energy": (0.1, 0.3, 0.25), "thinnest_nm": 20.0, "thickest_nm": 40.0}
+    found = answer(Target(start=OXIDE, film=wish), "weier2020")
+    assert 20 - 1e-9 <= found.stack.flat()["layer0_film0_thickness_nm"] <= 40 + 1e-9
 
 
 def test_a_wish_at_grazing_keeps_the_lobes_of_the_present_material() -> None:
@@ -147,8 +148,16 @@ def test_what_cannot_be_is_refused_with_a_way_out_that_can(wish: dict[str, Any],
         ({"start": PANE, "passed": [{"energy": 0.5}] * 5}, "passed: must be a mapping of angle, energy, alpha, haze"),
         (
             {"start": OXIDE, "film": [{"energy": 0.5}] * 2},
-            "film: must be a mapping of angle, energy, layer, film, thick",
+            "film: must be a mapping of angle, energy, layer, film, thin",
         ),
+        (
+            {"start": OXIDE, "film": {"energy": 0.5, "thinnest_nm": 2000.0}},
+            "film: thickest_nm: must be above thinnest_nm",
+        ),
+        ({"lobes": PAIR, "available": []}, "available: must be a list of 24 indices or names of substances at most"),
+        ({"lobes": PAIR, "available": ["watr"]}, "available: eta: unknown name 'watr' (did you mean water?)"),
+        ({"lobes": PAIR, "available": ["Au"]}, "available: holds no substance for any interface; name dielectrics"),
+        ({"start": PANE, "available": ["water"]}, "available: chooses indices of lobes; write lobes"),
         ({"start": PANE, "passed": {"colour": 1}}, "passed: unknown key 'colour'"),
         ({"passed": {"energy": 0.5}}, "lobes: must hold at least one lobe; without any, write a start"),
         ({}, "lobes: must hold at least one lobe, or grazing, passed, body, film with a start"),
@@ -171,3 +180,30 @@ def test_a_search_for_lobes_alone_takes_no_other_wish() -> None:
         invert_stack(WISHES["passed"][0], "bati2021")
     found = answer(PAIR, "bati2021")
     assert found.met and found.stack == invert_stack(PAIR, "bati2021").stack
+
+
+# Substances that are available ---------------------------------------------------------------------------------------
+
+
+def test_a_stack_of_available_substances_is_found_by_its_lobes() -> None:
+    """Truth: the stack whose lobes are asked for.
+
+    Expected: its substances by name first, then others, ever further off; what is fixed stays.
+    """
+    true = Stack([Interface(eta="bk7", alpha=0.1), Medium(sigma_a=0.2), Interface(conductor="Cu", alpha=0.2)])
+    seen = vt.lobes(true, 1.0, model="bati2021")
+    top, metal = (
+        {"energy": tuple(energy[:, 0].tolist()), "alpha": float(alpha[0, 0])}
+        for energy, alpha in zip(seen.energy, seen.alpha)
+    )
+    wish = {"lobes": [top, {**metal, "base": "conductor"}], "available": ["water", "bk7", 1.8, "Au", "Cu", "Al"]}
+    first, *others = answers(wish, 4, "bati2021")
+    assert (first.stack.interfaces[0].eta, first.stack.interfaces[1].conductor) == ("bk7", "Cu")
+    assert first.met and first.stack.interfaces[0].alpha == pytest.approx(0.1, abs=1e-3)
+    assert len(others) == 3
+    assert [each.missed for each in others] == sorted(each.missed for each in others)
+    for each in others:
+        assert each.stack.interfaces[0].eta in ("water", "bk7", 1.8)
+        assert each.stack.interfaces[1].conductor in ("Au", "Cu", "Al")
+    pinned = {"lobes": [{**top, "fixed": {"eta": [1.33]}}, wish["lobes"][1]], "available": ["bk7", "Cu"]}
+    assert answer(pinned, "bati2021").stack.interfaces[0].eta == pytest.approx(1.33)

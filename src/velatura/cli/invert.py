@@ -75,13 +75,16 @@ def invert(
     Of the whole: exterior (1), eta_max (4), channels (mean or separate), name;
       start       a material, as a file has it, with which the search begins
 
+      available   substances that interfaces may lie above: [water, bk7, 1.6, Au]
+
     Wishes beyond these, of lobes or of a start alone: energy, and angle (degrees):
 
     
       grazing     what is reflected at a second angle (75); lobe, alpha
       passed      what a pane passes; alpha, or haze in its place
       body        the colour of a base or scattering medium, seen from outside
-      film        the colour by a film's thickness; layer, film, thickest_nm
+      film        the colour by a film's thickness; layer, film,
+                  thinnest_nm, thickest_nm
     """
     # Refuse what cannot work before anything slow begins
     from velatura import inverse
@@ -89,11 +92,11 @@ def invert(
 
     wanted, name, switches = read(target, model, settings)
     folder = _folder(output, count)
-    if plot and wanted.further:
-        raise InvalidInput(f"--plot: draws classes of lobes alone; the target asks for {wanted.further[0].key}, too")
+    if plot and wanted.beyond_lobes:
+        raise InvalidInput(f"--plot: draws classes of lobes alone; the target asks for {wanted.beyond_lobes[0]}, too")
     drawn = picture(target) if plot else None
 
-    solve: Callable[..., list[Any]] = inverse.answers if wanted.further else inverse.alternatives
+    solve: Callable[..., list[Any]] = inverse.answers if wanted.beyond_lobes else inverse.alternatives
     try:
         with progress.clock(f"Solving {Path(target).name}"):
             found = solve(wanted, count, name, seed, **switches)
@@ -109,7 +112,7 @@ def invert(
             print(f"No stack: {error.why}. Taken in its place: {taken.words}.")
         found = solve(taken.target, count, name, seed, **switches)
     paths = _write(found, output, folder, Path(target).stem)
-    if wanted.further:
+    if wanted.beyond_lobes:
         _say(found, paths, as_json)
         return
     if drawn:
@@ -144,6 +147,8 @@ def _say(found: list[Answer], paths: list[Path], as_json: bool) -> None:
         print(json.dumps({**report, "reached": first.reached.to_dict(), **more}, allow_nan=False))
         return
     for one in found:
+        for n, (lobe, own) in enumerate(zip(one.target.lobes, one.reached.lobes), 1):
+            print(f"asked: lobe {n} {_described(lobe)}; has: {_described(own)}")
         for wish, has in zip(one.target.further, one.reached.further):
             print(f"asked: {wish.words()}; has: {has.words()}")
         if not paths:
@@ -151,6 +156,11 @@ def _say(found: list[Answer], paths: list[Path], as_json: bool) -> None:
     say_for_which(found[0].model)
     for path in paths:
         print(path)
+
+
+def _described(lobe: TargetLobe) -> str:
+    alpha = lobe.axes[:2] if lobe.brushed else lobe.roughness
+    return f"energy {options.cell(lobe.energy)}, alpha {options.cell(alpha)}"
 
 
 def read(target: str, model: str | None, settings: list[str] | None) -> tuple[Target, str, dict[str, str]]:

@@ -18,13 +18,14 @@ import numpy as np
 
 from velatura.errors import InvalidInput
 from velatura.inverse.fitting.free_values import Free, FreeValues
-from velatura.inverse.fitting.simplify import with_media
+from velatura.inverse.fitting.simplify import first_stacks, with_media
 from velatura.inverse.invert import alternatives, invert_stack, model_of
 from velatura.inverse.lobes.partial_stack import Array
 from velatura.inverse.lobes.target import Target, TargetLobe, read
 from velatura.inverse.local.approach import Secants
 from velatura.inverse.reasons import Direction, Infeasible
 from velatura.inverse.wishes import KINDS
+from velatura.inverse.wishes.available import made_of
 from velatura.inverse.wishes.wish import compared
 from velatura.model import DEFAULT, Model
 from velatura.model.lobe_statistics import StackLobes
@@ -39,6 +40,7 @@ STRIDE = 1e-4  # of coordinates, for slopes
 ENOUGH = 2e-5  # of what is missed, where a search ends
 MISSED = 5e-3  # of what is missed that is worth a word: half a unit of CIE 1976, or .001 of a roughness
 DRAWN, TRIED = 40, 3  # stacks with the lobes that are looked at, and that searches begin with
+INDEX = {"eta", "k"}  # keys that stay where substances are given
 SAME = 1e-3  # relative difference of values that are one answer
 
 
@@ -107,12 +109,12 @@ def answers(
     other thicknesses of a film. Raises as `answer`."""
     wanted = read(target)
     chosen = model_of(wanted, model, **switches)
-    if not wanted.further:
+    if not wanted.beyond_lobes:
         return [Answer(one.stack, wanted, chosen, 0.0) for one in alternatives(wanted, count, chosen, seed)]
     found = nearest_answers(wanted, count, chosen, seed)
-    if not found[0].met and not wanted.film:
+    if not found[0].met and not wanted.nearest:
         raise refused(found[0])
-    return [each for each in found if each.met or wanted.film]
+    return [each for each in found if each.met or wanted.nearest]
 
 
 def nearest_answers(wanted: Target, count: int, model: Model, seed: int = 0, quick: bool = False) -> list[Answer]:
@@ -128,7 +130,8 @@ def nearest_answers(wanted: Target, count: int, model: Model, seed: int = 0, qui
     for wish in wanted.further:
         starts = [other for stack in starts for other in wish.starts(stack)]
     held = _held(wanted, starts[0], model)
-    tried = sorted(starts, key=lambda stack: _Search.of(held, stack, model.surrogate).cost)
+    tried = _made_of(held, starts, model) or starts
+    tried.sort(key=lambda stack: _Search.of(held, stack, model.surrogate).cost)
     effort, found = QUICK if quick else THOROUGH, list[Answer]()
     searches = [_Search.of(held, start, model) for start in tried[: max(TRIED, 2 * count)]]
     for search in searches:
@@ -137,7 +140,7 @@ def nearest_answers(wanted: Target, count: int, model: Model, seed: int = 0, qui
             found.append(each)
         if sum(each.met for each in found) == count:
             break
-    if not wanted.film and not any(each.met for each in found):
+    if not wanted.nearest and not any(each.met for each in found):
         found.append(searches[0].answer(searches[0].along(effort), wanted))
     return sorted(found, key=lambda each: each.missed)[:count]
 
@@ -146,12 +149,36 @@ def _starts(wanted: Target, count: int, model: Model, seed: int) -> list[Stack]:
     """The present material, or else stacks that have the lobes."""
     if wanted.start:
         return [wanted.start]
-    alone = wanted.model_copy(update={key: () for key in KINDS})
+    alone = wanted.model_copy(update={key: () for key in wanted.beyond_lobes})
+    drawn = max(DRAWN, count), model.surrogate, seed
     try:
-        found = alternatives(alone, max(DRAWN, count), model.surrogate, seed)
+        found = first_stacks(alone, *drawn) if wanted.nearest else alternatives(alone, *drawn)
     except Infeasible:
         found = [invert_stack(alone, model)]
-    return [with_media(each.stack) for each in found]
+    return [_pinned(with_media(each.stack), wanted) for each in found]
+
+
+def _pinned(stack: Stack, wanted: Target) -> Stack:
+    """The stack with what is fixed of its interfaces: one that has the nearest lobes may not have it."""
+    places = iter(n for n, layer in enumerate(stack.layers) if isinstance(layer, Interface))
+    pins: dict[str, Any] = {}
+    for lobe in wanted.lobes:
+        for n, place in zip(range(lobe.interfaces), places):
+            values = {key: lobe.fixed.of(key, n) for key in ("eta", "k", "alpha")}
+            pins |= {f"layer{place}_{key}": value for key, value in values.items() if value is not None}
+    return stack.replace(**pins) if pins else stack
+
+
+def _made_of(wanted: Target, starts: list[Stack], model: Model) -> list[Stack]:
+    """Stacks of substances that are available, whose other values come near to the wish; none where all are."""
+    if not wanted.available:
+        return []
+    kept = [n for n, keys in _fixed(wanted, starts[0]).items() if keys & INDEX]
+    found = []
+    for stack in made_of(starts, wanted.available, kept):
+        search = _Search.of(wanted, stack, model.surrogate)
+        found.append(search.values.placed(search.straight(QUICK))[0])
+    return found
 
 
 def _held(wanted: Target, stack: Stack, model: Model) -> Target:
@@ -178,8 +205,15 @@ def refused(found: Answer) -> Infeasible:
 
 
 def _alike(one: Stack, other: Stack) -> bool:
-    a, b = ({k: v for k, v in each.flat().items() if isinstance(v, int | float)} for each in (one, other))
-    return a.keys() == b.keys() and all(np.isclose(a[key], b[key], rtol=SAME, atol=SAME) for key in a)
+    """Whether two stacks differ by little in numbers, and in nothing else."""
+    if one.flat().keys() != other.flat().keys():
+        return False
+    return all(_close(a, b) for a, b in zip(one.flat().values(), other.flat().values()))
+
+
+def _close(a: Any, b: Any) -> bool:
+    numbers = all(isinstance(x, int | float | tuple) for x in (a, b))
+    return bool(np.allclose(a, b, rtol=SAME, atol=SAME) if numbers else a == b)
 
 
 @dataclass(frozen=True)
@@ -246,7 +280,7 @@ class _Search:
             moved = [each for one in wish.further if (each := one.moved(free, stack))]
             if not moved and not (wish.lobes and free.keys != ("albedo",) and not free.keys[0].startswith("film")):
                 return None
-            kept = fixed.get(free.layer, set())
+            kept = fixed.get(free.layer, set()) | (INDEX if wish.available else set())
             return None if free.keys[0].partition("_")[0] in kept else (moved or [free])[0]
 
         values = FreeValues(start=stack, eta_max=wish.eta_max, allowed=allowed)

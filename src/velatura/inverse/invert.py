@@ -43,8 +43,8 @@ def invert_stack(
         Infeasible: there is no such stack; the error gives the reason, and the nearest targets that have one.
     """
     wanted = read(target)
-    if wanted.further:
-        key = wanted.further[0].key
+    if wanted.beyond_lobes:
+        key = wanted.beyond_lobes[0]
         raise InvalidInput(f"{key}: is no wish for lobes; velatura invert and vt.inverse.answer take it")
     chosen, start = model_of(wanted, model, **switches), wanted.start
     wanted = wanted.model_copy(update={"start": None})

@@ -73,14 +73,14 @@ def fit_target(
     """
     wanted = read(target)
     chosen = model_of(wanted, model, **switches)
-    found = [with_media(solution.stack) for solution in _first(wanted, starts, chosen.surrogate, seed)]
+    found = [with_media(solution.stack) for solution in first_stacks(wanted, starts, chosen.surrogate, seed)]
     if table.directions.brushed:
         turned = [_brushed(stack, angle) for stack in found for angle in BRUSHED]
         found = _closest(table, turned, chosen, wanted.eta_max, starts)
     return fit(table, found, chosen, wanted.eta_max, _with_one_less)
 
 
-def _first(target: Target, count: int, model: Model, seed: int) -> list[Solution]:
+def first_stacks(target: Target, count: int, model: Model, seed: int) -> list[Solution]:
     """Stacks that have the lobes of a target, which may be a rough guess: or those of the nearest one that has any."""
     try:
         return alternatives(target, count, model, seed)

@@ -11,7 +11,7 @@ import numpy as np
 from pydantic import model_validator
 
 from velatura.errors import InvalidInput, within
-from velatura.inverse.wishes import KINDS, Body, FilmColour, Grazing, Passed, Wish, Wished
+from velatura.inverse.wishes import KINDS, Available, Body, FilmColour, Grazing, Passed, Wish, Wished
 from velatura.model.roughness_maps import MAPS, RoughnessMap
 from velatura.model.variance import Covariance, Isotropic, PerAxis, Roughness, Variance
 from velatura.stack import RGB, Mix, Stack, io, single
@@ -233,6 +233,7 @@ class Target(Record):
     passed: Annotated[tuple[Passed, ...], Wished("of what passes", record=Passed)] = ()
     body: Annotated[tuple[Body, ...], Wished("of a diffuse base or a medium that scatters", record=Body)] = ()
     film: Annotated[tuple[FilmColour, ...], Wished("of the colour of a film", record=FilmColour, most=1)] = ()
+    available: Annotated[tuple[Any, ...], Available("substances that interfaces may lie above")] = ()
 
     def __init__(self, /, lobes: Iterable[TargetLobe | Mapping[str, Any]] = (), **options: Any) -> None:
         if isinstance(lobes, str | Mapping) or not isinstance(lobes, Iterable):
@@ -241,6 +242,8 @@ class Target(Record):
 
     @model_validator(mode="after")
     def _lobes_fit_together(self) -> Target:
+        if self.available and not self.lobes:
+            raise ValueError("available: chooses indices of lobes; write lobes")
         if not self.lobes and not (self.further and self.start):
             other = "; without any, write a start" if self.further else f", or {', '.join(KINDS)} with a start"
             raise ValueError(f"lobes: must hold at least one lobe{other}")
@@ -255,6 +258,16 @@ class Target(Record):
             found = len(self.start.interfaces)
             raise ValueError(f"start: must have as many interfaces as the lobes, {wanted}, got {found}")
         return self
+
+    @property
+    def beyond_lobes(self) -> tuple[str, ...]:
+        """Keys that ask for more than lobes."""
+        return tuple(key for key in (*KINDS, "available") if getattr(self, key))
+
+    @property
+    def nearest(self) -> bool:
+        """Whether the nearest stack is the answer, however far: thicknesses and substances have few looks."""
+        return bool(self.film or self.available)
 
     @property
     def further(self) -> tuple[Wish, ...]:

@@ -7,6 +7,7 @@ from dataclasses import replace
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar
 
 import numpy as np
+from pydantic import model_validator
 
 from velatura.errors import InvalidInput
 from velatura.inverse.wishes.wish import Lacking, Wish, colour, compared
@@ -33,9 +34,18 @@ class FilmColour(Wish):
 
     layer: Annotated[int | None, Whole("of the interface with the film; the first that has any", high=47)] = None
     film: Annotated[int, Whole("which film of the layer, from the top, counted from 0", high=Films.most - 1)] = 0
+    thinnest_nm: Annotated[
+        float, Scalar("the smallest thickness", low=THINNEST_NM, high=THICKEST_NM, unit="nm", texturable=False)
+    ] = THINNEST_NM
     thickest_nm: Annotated[
         float, Scalar("the largest thickness", low=THINNEST_NM, high=THICKEST_NM, unit="nm", texturable=False)
     ] = 1000.0
+
+    @model_validator(mode="after")
+    def _some_thickness(self) -> FilmColour:
+        if self.thinnest_nm >= self.thickest_nm:
+            raise ValueError(f"thickest_nm: must be above thinnest_nm, {self.thinnest_nm:g}, got {self.thickest_nm:g}")
+        return self
 
     def shown(self, seen: StackLobes, n: int, groups: Sequence[Sequence[int]]) -> dict[str, Any]:
         return {"energy": colour(np.sum(seen.energy, axis=0)[:, n] + seen.remainder[:, n])}
@@ -52,7 +62,7 @@ class FilmColour(Wish):
     def moved(self, free: Free, stack: Stack) -> Free | None:
         if free.keys != (film_key(self.film, "thickness_nm"),) or free.layer != self.place(stack):
             return None
-        return replace(free, high=self.thickest_nm)
+        return replace(free, low=self.thinnest_nm, high=self.thickest_nm)
 
     def lacking(self, stack: Stack) -> Lacking | None:
         if self.place(stack) is not None:
@@ -68,7 +78,7 @@ class FilmColour(Wish):
     def starts(self, stack: Stack) -> list[Stack]:
         """The stack with thicknesses whose colours are nearer than those beside them, the nearest first."""
         name = self.name(stack)
-        thickness = np.arange(THINNEST_NM, self.thickest_nm + STEPS_NM, STEPS_NM).clip(max=self.thickest_nm)
+        thickness = np.arange(self.thinnest_nm, self.thickest_nm + STEPS_NM, STEPS_NM).clip(max=self.thickest_nm)
         cosine = np.cos(np.radians(self.angle))
         missed = np.empty(len(thickness))
         for k, each in enumerate(thickness):
