@@ -794,6 +794,13 @@ def test_a_wish_is_answered_from_the_material_that_it_began_with() -> None:
     assert vt.Stack.from_dict(answer["material"]).flat()["layer1_sigma_a"] == pytest.approx(0, abs=1e-6)
 
 
+def test_a_drag_of_lobes_takes_no_other_wish() -> None:
+    target = {"lobes": [{"energy": 0.1}], "passed": {"energy": 0.5}}
+    for verb in ("invert", "ways", "class"):
+        with pytest.raises(InvalidInput, match="passed: is no wish for lobes"):
+            VERBS[verb]({"target": target, "lobe": 0})
+
+
 def test_a_material_states_what_it_lacks_for_a_wish() -> None:
     """Expected: for a clear pane its haze, and a medium; the way adds what is lacking, which is no more after it."""
     pane = {"layers": [{"interface": {"eta": 1.5, "alpha": 0.1}}, {"interface": {"eta": 1.0}}]}

@@ -224,7 +224,7 @@ def invert(body: Body) -> Answer:
 
     With `read`, the lobes that the material has, a model without a closed form is read few times: `rough` says so.
     """
-    wish = Target.from_dict(body.get("target"))
+    wish = Target.from_dict(body.get("target")).of_lobes()
     model, material = reader_of(body, wish), body.get("material")
     near = held(material, wish, model) if material else None
     if near is None:
@@ -290,7 +290,7 @@ def _searched(wish: Target, model: Model) -> Answer:
 def ways(body: Body) -> Answer:
     """Ways out of a target without a stack, the nearest first: `words`, and the `target` that has one, by a slow model
     with that stack as its `start`. None where the target has a stack, since only the present one was in its way."""
-    wish = Target.from_dict(body.get("target"))
+    wish = Target.from_dict(body.get("target")).of_lobes()
     try:
         found = invert_stack(wish, reader_of(body, wish))
     except Infeasible as error:

@@ -104,7 +104,7 @@ def member(body: Body) -> Answer:
 
 def _held(body: Body) -> tuple[Target, DraggedStack, int]:
     """The target, the material that has it, and the requested lobe."""
-    target = Target.from_dict(body.get("target"))
+    target = Target.from_dict(body.get("target")).of_lobes()
     near = dragged(body, target)
     if near is None:
         raise InvalidInput("material: does not have the interfaces of the target")

@@ -9,7 +9,6 @@ from typing import Any
 
 import numpy as np
 
-from velatura.errors import InvalidInput
 from velatura.inverse import refined
 from velatura.inverse.explain import infeasible
 from velatura.inverse.lobes import sampling
@@ -42,10 +41,7 @@ def invert_stack(
         InvalidInput: not a target, or an unknown model or switch.
         Infeasible: there is no such stack; the error gives the reason, and the nearest targets that have one.
     """
-    wanted = read(target)
-    if wanted.beyond_lobes:
-        key = wanted.beyond_lobes[0]
-        raise InvalidInput(f"{key}: is no wish for lobes; velatura invert and vt.inverse.answer take it")
+    wanted = read(target).of_lobes()
     chosen, start = model_of(wanted, model, **switches), wanted.start
     wanted = wanted.model_copy(update={"start": None})
     begun = refined.from_start(start, wanted, chosen) if start else None

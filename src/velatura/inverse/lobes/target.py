@@ -264,6 +264,14 @@ class Target(Record):
         """Keys that ask for more than lobes."""
         return tuple(key for key in (*KINDS, "available") if getattr(self, key))
 
+    def of_lobes(self) -> Target:
+        """This target, which asks for lobes alone. Raises InvalidInput where it asks for more."""
+        if self.beyond_lobes:
+            raise InvalidInput(
+                f"{self.beyond_lobes[0]}: is no wish for lobes; velatura invert and vt.inverse.answer take it"
+            )
+        return self
+
     @property
     def nearest(self) -> bool:
         """Whether the nearest stack is the answer, however far: thicknesses and substances have few looks."""
