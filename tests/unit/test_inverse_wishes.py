@@ -182,6 +182,22 @@ def test_a_search_for_lobes_alone_takes_no_other_wish() -> None:
     assert found.met and found.stack == invert_stack(PAIR, "bati2021").stack
 
 
+def test_what_is_fixed_above_the_first_lobe_stays() -> None:
+    lobes = [{"energy": (0.1, 0.12, 0.14), "alpha": 0.1, "interfaces": 2, "fixed": {"tau": [0.2, None]}}]
+    found = answer({"lobes": lobes, "grazing": {"energy": (0.08, 0.1, 0.12), "angle": 70}}, "bati2021").stack
+    assert found.kinds[0] == "medium"
+    assert found.layers[0].flat()["sigma_a"] == pytest.approx(0.2)
+
+
+def test_pigments_stay_where_something_else_may_change() -> None:
+    """Expected: the coat is rougher, and the medium has the pigments that it had."""
+    pigmented = Medium(pigments=[{"K": 0.1, "S": 0.2, "concentration": 0.5}])
+    start = Stack([Interface(eta=1.5, alpha=0.1), pigmented, Interface(eta=1.0, alpha=0.1)])
+    found = answer({"start": start, "passed": {"haze": 0.97}}, "velatura").stack
+    assert found.layers[1] == pigmented
+    assert found.interfaces[0].alpha > 0.1
+
+
 # Substances that are available ---------------------------------------------------------------------------------------
 
 

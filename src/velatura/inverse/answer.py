@@ -155,7 +155,16 @@ def _starts(wanted: Target, count: int, model: Model, seed: int) -> list[Stack]:
         found = first_stacks(alone, *drawn) if wanted.nearest else alternatives(alone, *drawn)
     except Infeasible:
         found = [invert_stack(alone, model)]
-    return [_pinned(with_media(each.stack), wanted) for each in found]
+    return [_pinned(_with_media(each.stack, wanted), wanted) for each in found]
+
+
+def _with_media(stack: Stack, wanted: Target) -> Stack:
+    """The stack with a medium between all interfaces, and with one above them where that is fixed."""
+    whole = with_media(stack)
+    if wanted.lobes[0].fixed.of("tau", 0) is None:
+        return whole
+    first = next(n for n, layer in enumerate(stack.layers) if layer.surface)
+    return whole.with_layers([*stack.layers[:first], *whole.layers])
 
 
 def _pinned(stack: Stack, wanted: Target) -> Stack:
@@ -277,6 +286,9 @@ class _Search:
         fixed = _fixed(wish, stack)
 
         def allowed(free: Free) -> Free | None:
+            layer = stack.layers[free.layer]
+            if isinstance(layer, Medium) and layer.pigments:  # which give its colour
+                return None
             moved = [each for one in wish.further if (each := one.moved(free, stack))]
             if not moved and not (wish.lobes and free.keys != ("albedo",) and not free.keys[0].startswith("film")):
                 return None
