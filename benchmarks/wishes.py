@@ -22,7 +22,9 @@ from rows import parsed, row
 
 from velatura import reference
 from velatura.inverse import Infeasible, Target, alternatives, answer
+from velatura.inverse.wishes.passed import haze
 from velatura.model.registry import stack_lobes
+from velatura.reference import batches
 from velatura.stack import Diffuse, Interface, Medium, Stack
 from velatura.stack.values import Film
 
@@ -102,11 +104,20 @@ def walked(kind: str, stack: Stack, angle: float, paths: int, seed: int) -> dict
     found = reference.statistics(stack, np.cos(np.radians(angle)), paths=paths, seed=seed, microsurface=True)
     if kind == "passed":
         assert found.transmitted
-        return {"energy": found.transmitted.energy[:, 0], "alpha": found.transmitted.alpha.mean()}
+        energy = found.transmitted.energy[:, 0]
+        return {"energy": energy, "alpha": found.transmitted.alpha.mean(), "haze": walked_haze(stack, paths, seed)}
     energy = np.sum(found.energy, axis=0)[:, 0]
     if kind == "body":  # walks count it for the surface below it
         energy = energy - np.sum(shown(stack, angle).energy, axis=0)[:, 0]
     return {"energy": energy}
+
+
+def walked_haze(stack: Stack, paths: int, seed: int) -> float:
+    """Share of the light passing at normal incidence that is turned by more than 2.5 degrees, by walks."""
+    ends = batches.ends(stack, np.array([0.0, 0.0, 1.0]), paths, seed, True, False)
+    passed, weight = ends.w[2] < 0, ends.weight.mean(axis=0)
+    turned = passed & (ends.w[2] > -np.cos(np.radians(2.5)))
+    return float(weight[turned].sum() / weight[passed].sum())
 
 
 def main() -> int:
@@ -115,6 +126,7 @@ def main() -> int:
     for kind in options.kinds:
         rng, times, refused = np.random.default_rng(options.seed), list[float](), 0
         apart: dict[str, list[float]] = {"energy": [], "alpha": []}
+        hazes: list[float] = []
         for n in range(options.wishes):
             wish = Target(**KINDS[kind](rng))
             begun = time.process_time()
@@ -130,10 +142,13 @@ def main() -> int:
             apart["energy"] += np.abs(has["energy"] / energy - 1)[energy > FAINT].tolist()
             if "alpha" in has:
                 apart["alpha"].append(abs(has["alpha"] / asked.alpha - 1))
+                hazes.append(abs(has["haze"] - haze(asked.alpha)))
         for key, off in apart.items():
             if off:
                 row("wishes", f"{kind}: {key} off by", [100 * x for x in off], "%", f"{100 * max(off):.1f} at most")
                 failed |= float(np.median(off)) > BOUNDS[key]
+        if hazes:
+            row("wishes", f"{kind}: haze off by", hazes, "", f"{max(hazes):.3f} at most")
         row("wishes", f"{kind}: an answer", times, remark=f"{max(times):.1f} at most; {refused} refused")
     return int(failed)
 
