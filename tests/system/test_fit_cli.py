@@ -81,6 +81,10 @@ def test_a_set_of_tables_is_fitted_once_each(run: Run, folder: Path) -> None:
     status, out, err = run(*arguments)
     assert (status, err) == (0, "")
     assert [line.endswith("(known)") for line in out.splitlines()] == [True, False]
+    for broken in ('{"error": NaN}', "[" * 10**5, '{"error": 1.0, "model_error": 3}', "\x00"):
+        (folder / "fits" / "two.json").write_text(broken)
+        status, out, err = run(*arguments)
+        assert (status, err, out.splitlines()[1].endswith("(known)")) == (0, "", False)
     report = json.loads(run(*arguments, "--json")[1])
     assert report["tables/one.csv"] == json.loads((folder / "fits" / "one.json").read_text())
 

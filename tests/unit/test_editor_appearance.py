@@ -783,12 +783,15 @@ def test_a_wrong_depth_is_one_line(name: str, depths: dict[str, Any], says: str)
 def test_a_wish_is_answered_from_the_material_that_it_began_with() -> None:
     """Expected: what the material shows is what was asked for, coarsely too, and a reason where it cannot be."""
     plate = vt.preset("tinted-plate").to_dict()
-    body = {"material": plate, "model": "bati2021", "target": {"passed": {"energy": [0.5, 0.3, 0.2]}}}
+    wish = {"passed": {"energy": [0.5, 0.3, 0.2]}}
+    body = {"material": plate, "model": "bati2021", "target": wish}
     for coarse in (True, False):
         answer = VERBS["wish"]({**body, "coarse": coarse})
         assert answer["snapped"] is None
         passed = next(each for each in answer["wishes"] if each["key"] == "passed")
         assert passed["energy"] == pytest.approx([0.5, 0.3, 0.2], abs=2e-3)
+    own = vt.inverse.answer({**wish, "start": plate}, "bati2021").stack
+    assert vt.Stack.from_dict(answer["material"]) == own  # at rest
     answer = VERBS["wish"]({**body, "target": {"passed": {"energy": 0.99}}})
     assert answer["snapped"].startswith("no stack of these layers is found that has passed energy 0.99")
     assert vt.Stack.from_dict(answer["material"]).flat()["layer1_sigma_a"] == pytest.approx(0, abs=1e-6)

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from velatura.cli import invert, options, progress
-from velatura.errors import InvalidInput, MissingTool
+from velatura.errors import InvalidInput, MissingTool, one_line
 
 if TYPE_CHECKING:
     from velatura.inverse import Fit, ModelError, ReflectanceTable
@@ -108,7 +108,7 @@ def _set(made: Iterable[Entry], folder: Path | None, plot: bool, as_json: bool) 
         if each.report is None:
             failed = True
             where = "" if each.why.startswith(str(each.path)) else f"{each.path}: "
-            print(f"velatura: {where}{each.why}", file=sys.stderr)
+            print(one_line(f"velatura: {where}{each.why}"), file=sys.stderr)
             continue
         reports[str(each.path)] = each.report
         if not as_json:

@@ -125,7 +125,12 @@ def _asked(path: Path, options: list[Any]) -> str:
 def _known(report: Path) -> dict[str, Any]:
     """A report that was written; empty where there is none."""
     try:
-        known = json.loads(files.content(report, LARGEST))
-    except (VelaturaError, OSError, ValueError, RecursionError):
+        known = json.loads(files.content(report, LARGEST), parse_constant=_no_number)
+        errors = [known["error"], *([known["model_error"]["error"]] if "model_error" in known else [])]
+    except (VelaturaError, OSError, ValueError, TypeError, KeyError, RecursionError):
         return {}
-    return known if isinstance(known, dict) and isinstance(known.get("error"), float) else {}
+    return known if all(isinstance(error, float) for error in errors) else {}
+
+
+def _no_number(name: str) -> None:
+    raise ValueError(f"{name} is no number")
