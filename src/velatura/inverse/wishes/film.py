@@ -23,6 +23,7 @@ if TYPE_CHECKING:
 THINNEST_NM = 1.0
 QUICK = "weier2020"  # by which thicknesses are looked through: it has no averages over facets
 STEPS_NM = 10.0  # of these: a fringe of an index of 4 has 50 nm
+TINY = 1e-12  # curvature that is none
 ORDERS = 8  # thicknesses that a search begins with
 OXIDE = 2.4, 60.0  # index and thickness of a film where there is none
 
@@ -89,5 +90,12 @@ class FilmColour(Wish):
                 missed[k] = np.inf
         beside = np.r_[np.inf, missed, np.inf]
         least = np.flatnonzero((missed <= beside[:-2]) & (missed <= beside[2:]) & np.isfinite(missed))
-        nearest = least[np.argsort(missed[least], kind="stable")][:ORDERS]
-        return [stack.replace(**{name: float(thickness[k])}) for k in nearest]
+        # The least of the parabola through a thickness and those beside it, of squares
+        before, here, after = (beside[least + k] ** 2 for k in range(3))
+        inside = np.isfinite(before + after)
+        lean, bend = np.where(inside, before - after, 0.0), np.where(inside, before - 2 * here + after, 1.0)
+        shift = lean / np.maximum(2 * bend, TINY)  # within half a step, since both neighbours are further off
+        lowest = here - lean * shift / 4
+        nearest = np.argsort(lowest, kind="stable")[:ORDERS]
+        found = np.clip(thickness[least] + STEPS_NM * shift, self.thinnest_nm, self.thickest_nm)
+        return [stack.replace(**{name: float(found[k])}) for k in nearest]
