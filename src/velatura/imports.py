@@ -2,6 +2,7 @@
 
 from velatura.programs.formats import (
     FORMATS,
+    choice,
     from_gltf,
     from_openpbr,
     from_principled,
@@ -15,6 +16,7 @@ __all__ = [
     "FORMATS",
     "Imported",
     "Left",
+    "choice",
     "from_gltf",
     "from_openpbr",
     "from_principled",

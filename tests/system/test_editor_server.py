@@ -157,6 +157,31 @@ def test_textures_are_sent_and_nothing_else(here: Path, port: int) -> None:
         assert ask(port, "GET", f"/files/{path}")[0] == 404
 
 
+def test_materials_of_other_programs_are_read(here: Path, port: int) -> None:
+    """Expected: material and losses of a file of the folder and of one that is sent, which leaves nothing behind."""
+    scene = '<scene version="3.0.0">{}</scene>'
+    gilt = '<bsdf type="principled" id="{}"><float name="sheen" value="1"/></bsdf>'
+    (here / "gilt.xml").write_text(scene.format(gilt.format("Gilt")))
+    status, answer = call(port, "import", {"file": "gilt.xml"})
+    assert status == 200 and answer["material"]["name"] == "Gilt"
+    assert answer["left"][0].startswith("sheen 1: ")
+    two = base64.b64encode(scene.format(gilt.format("A") + gilt.format("B")).encode()).decode()
+    assert call(port, "import", {"file": "two.xml", "data": two}) == (200, {"names": ["A", "B"]})
+    assert call(port, "import", {"file": "two.xml", "data": two, "name": "B"})[1]["material"]["name"] == "B"
+
+    texture = '<texture type="bitmap" name="base_color"><string name="filename" value="{}"/></texture>'
+    image = f'<bsdf type="principled">{texture}</bsdf>'
+    for path, says in (
+        ("none.png", "far.xml: bsdf 0: texture: file not found: none.png"),
+        ("../static/index.html", "index.html"),
+    ):
+        far = base64.b64encode(scene.format(image.format(path)).encode()).decode()
+        status, answer = call(port, "import", {"file": "far.xml", "data": far})
+        assert status == 422 and says in answer["error"] and str(here) not in answer["error"], answer
+    assert call(port, "import", {"file": "../gilt.xml"})[0] == 422
+    assert [file.name for file in here.iterdir()] == ["gilt.xml"]
+
+
 # What goes wrong
 
 

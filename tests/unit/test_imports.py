@@ -63,7 +63,7 @@ IMPORTED_BY = {
     "editor": "__init__ cli",
     "comparison": "__init__ figures cli benchmark",
     "exports": "__init__ cli editor",
-    "imports": "__init__ cli",
+    "imports": "__init__ cli editor",
     "figures": "cli editor",
     "sweeps": "__init__ cli",
 }

@@ -4,23 +4,27 @@ from __future__ import annotations
 
 import base64
 import binascii
+import contextlib
 import hashlib
 import itertools
 import os
+import tempfile
 import threading
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 
+from velatura import imports
 from velatura.editor.messages import TEXT, Answer, Body, Verb, admitting, document, field, to_write
 from velatura.errors import InvalidInput
-from velatura.files import whole
+from velatura.files import reason, whole
 from velatura.stack import dumps, load
-from velatura.stack.paths import beside, is_of_presets
+from velatura.stack.paths import beside, is_of_presets, rewritten
 
 #: Bytes of the largest file that is read, and of the largest request.
 LARGEST = 32 * 2**20
 
 MATERIALS = (".yaml", ".yml", ".json")
+FOREIGN = tuple(imports.FORMATS)
 PICTURES = (".png", ".jpg", ".jpeg", ".exr", ".hdr")
 
 
@@ -38,7 +42,8 @@ class Folder:
     @property
     def verbs(self) -> dict[str, Verb]:
         """Every verb by the name that the page calls it by."""
-        verbs = {"list": self.listed, "open": self.opened, "save": self.saved, "texture": self.texture}
+        verbs = {"list": self.listed, "open": self.opened, "save": self.saved}
+        verbs |= {"import": self.imported, "texture": self.texture}
         return {name: admitting(verb) for name, verb in verbs.items()}
 
     def first(self, material: str) -> Answer:
@@ -57,7 +62,7 @@ class Folder:
     def listed(self, body: Body) -> Answer:
         """The files that can be opened."""
         names = sorted(os.listdir(self.path))
-        kinds = {"files": MATERIALS, "textures": PICTURES}
+        kinds = {"files": (*MATERIALS, *FOREIGN), "textures": PICTURES}
         return {kind: [name for name in names if self._readable(name, endings)] for kind, endings in kinds.items()}
 
     def opened(self, body: Body) -> Answer:
@@ -67,6 +72,24 @@ class Folder:
             raise InvalidInput(f"{path.name}: a material file may have {TEXT >> 10} KiB at most here")
         version = _version(path)
         return {"material": document(load(os.path.relpath(path))), "version": version}
+
+    def imported(self, body: Body) -> Answer:
+        """The material of a file of another program, in the folder or in `data`, and what is `left` of it.
+
+        Images that the file holds are written into the folder. Where it has several materials, and `name` is none of
+        them, the answer is their `names`.
+        """
+        name = field(body, "file", str)
+        data = None if body.get("data") is None else _decoded(body)
+        with self._placed(name, data) as path:
+            names = [] if body.get("name") else imports.choice(path)
+            if names:
+                return {"names": names}
+            found = imports.read(path, body.get("name"))
+            with self.writing, beside(found.stack, self.path) as placed:
+                material = document(placed)
+                rewritten(material, self._check_near)
+        return {"material": material, "left": [str(each) for each in found.left]}
 
     def saved(self, body: Body) -> Answer:
         """Write a material; Conflict unless the file has the version given, None for a file that is not there."""
@@ -83,15 +106,37 @@ class Folder:
         """Put a picture into the folder, under a name that is free, or is this very picture's already."""
         name = field(body, "file", str)
         path = self.place(name, PICTURES)
-        try:
-            data = base64.b64decode(field(body, "data", str), validate=True)
-        except (binascii.Error, ValueError):
-            raise InvalidInput("data: must be in base64") from None
+        data = _decoded(body)
         with self.writing:
             free = _free(path, data)
             if not free.exists():
                 _write(free, data, check=lambda written: _check_picture(written, name))
         return {"file": free.name}
+
+    @contextlib.contextmanager
+    def _placed(self, name: str, data: bytes | None) -> Iterator[str]:
+        """The path of a file to import; `data` lies in the folder for the time being, so that it finds its images."""
+        if data is None:
+            yield os.path.relpath(self.existing(name, FOREIGN))
+            return
+        place = self.place(name, FOREIGN)
+        try:
+            with tempfile.NamedTemporaryFile(dir=self.path, prefix=".import-", suffix=place.suffix.lower()) as file:
+                file.write(data)
+                file.flush()
+                try:
+                    yield os.path.relpath(file.name)
+                except InvalidInput as error:
+                    text = str(error).replace(Path(file.name).name, name).replace(f"{self.path}{os.sep}", "")
+                    raise InvalidInput(text) from None
+        except OSError as error:
+            raise InvalidInput(f"{name}: cannot be put into the folder: {reason(error)}") from None
+
+    def _check_near(self, path: str) -> str:
+        """The path of an image or a table, which must lie in the folder. Raises InvalidInput."""
+        if Path(path).name != path and not is_of_presets(self.path / path):
+            raise InvalidInput(f"{path}: must lie in the folder that the editor was started in, beside the material")
+        return path
 
     # Names -----------------------------------------------------------------------------------------------------------
 
@@ -148,6 +193,13 @@ class Folder:
             return self.existing(name, endings).is_file()
         except InvalidInput:
             return False
+
+
+def _decoded(body: Body) -> bytes:
+    try:
+        return base64.b64decode(field(body, "data", str), validate=True)
+    except (binascii.Error, ValueError):
+        raise InvalidInput("data: must be in base64") from None
 
 
 def _version(path: Path) -> str | None:

@@ -47,7 +47,7 @@ SPARE = 4  # threads of a kind beside these, for answers that were given up, whi
 LANE_OF = {
     **dict.fromkeys(("shader", "values", "appearance", "wishes"), "picture"),
     **dict.fromkeys(("invert", "ways", "wish", "class", "member", "coat", "targets"), "slow"),
-    **dict.fromkeys(("truth", "validation", "film", "export"), "slow"),
+    **dict.fromkeys(("truth", "validation", "film", "export", "import"), "slow"),
 }
 
 
@@ -108,7 +108,7 @@ def application(material: str | None, token: str) -> Guard:
             return refusal(404, f"there is no verb {name}")
         if request.headers.get("content-type", "").partition(";")[0].strip().lower() != "application/json":
             return refusal(415, "a request must say that it is application/json")
-        most = LARGEST if name == "texture" else SMALL
+        most = LARGEST if name in ("texture", "import") else SMALL
         with tempfile.SpooledTemporaryFile(IN_MEMORY) as body:
             try:
                 with anyio.fail_after(BODY_TIME):

@@ -33,23 +33,39 @@ def read(path: str | Path, material: str | None = None) -> Imported:
     """
     file = foreign(str(path)) or str(path)
     material = material or str(path)[len(file) + 1 :] or None
-    ending = Path(file).suffix.lower()
-    if ending not in FORMATS:
-        raise InvalidInput(f"{file}: a file to import ends in {', '.join(FORMATS)}")
-    found: Mapping[str, Any]
-    found, chosen = reader(ending).materials(Path(file))
-    if not found:
-        raise InvalidInput(f"{file}: has no material that is read here")
-    material = chosen if material is None and chosen in found else material
+    found, chosen = _found(file)
+    material = chosen if material is None else material
     if material is None and len(found) > 1:
         names = ", ".join(list(found)[:12]) + (", ..." if len(found) > 12 else "")
         raise InvalidInput(f"{file}: has {len(found)} materials; name one, as in {Path(file).name}#NAME: {names}")
     name = next(iter(found)) if material is None else material
     if name not in found:
         raise InvalidInput(f"{file}: {unknown('material', name, found)}")
-    held = _held(Path(file)) if ending in BAKED and len(found) == 1 else None
+    held = _held(Path(file)) if Path(file).suffix.lower() in BAKED and len(found) == 1 else None
     imported: Imported = held or found[name](Notes())
     return imported
+
+
+@files.budget()
+def choice(path: str | Path) -> list[str]:
+    """The names of a file's materials where `read` needs one of them; none where it does not.
+
+    Raises:
+        InvalidInput: the file cannot be read, or has no material.
+    """
+    found, chosen = _found(str(path))
+    return list(found) if chosen is None and len(found) > 1 else []
+
+
+def _found(file: str) -> tuple[Mapping[str, Any], str | None]:
+    """The functions that read the materials of a file, by name, and the name that the file chooses, if any."""
+    ending = Path(file).suffix.lower()
+    if ending not in FORMATS:
+        raise InvalidInput(f"{file}: a file to import ends in {', '.join(FORMATS)}")
+    found, chosen = reader(ending).materials(Path(file))
+    if not found:
+        raise InvalidInput(f"{file}: has no material that is read here")
+    return found, chosen if chosen in found else None
 
 
 def _held(path: Path) -> Imported | None:

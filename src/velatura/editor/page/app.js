@@ -16,6 +16,7 @@ import { createStrips } from './state/strips.js';
 import { followTruth } from './state/truth.js';
 import { mountAppearance } from './views/appearance.js';
 import { chooseFile, offer } from './views/browser.js';
+import { createChoice } from './views/choice.js';
 import { mountInspector } from './views/inspector.js';
 import { createLayers } from './views/layers.js';
 import { createPage } from './views/page.js';
@@ -60,8 +61,9 @@ export function mount(root, { call, lacks = nothingLacks, live, session, storage
   const focus = (selector) => element.querySelector(selector)?.focus();
   const choose = (accept) => chooseFile(element, accept);
 
+  const choice = createChoice(update);
   const files = createFiles({
-    ...{ store, session, call, storage, messages, address },
+    ...{ store, session, call, lacks, storage, messages, address, ask: choice.ask },
     saved: keeper.flush, // another tab may begin from it
     conflict: (file, error) => messages.complain('save', error.message, { actions: conflict(file) }),
     offer: (blob, name) => offer(document, blob, name),
@@ -109,6 +111,7 @@ export function mount(root, { call, lacks = nothingLacks, live, session, storage
   });
   page = createPage({
     ...{ store, session, storage, edits, messages, picture, canvas, focus, update, lacks, toolbar: toolbar.view },
+    choice: choice.view,
     layers: createLayers({
       ...{ store, session, lacks, edits, messages, choose, upload: files.upload, focus, update, mix: toolbar.mix },
       strips: createStrips({ call, lacks, update }),
@@ -166,7 +169,7 @@ export function mount(root, { call, lacks = nothingLacks, live, session, storage
   followTyping(element, { signal });
   element.addEventListener('input', () => messages.forgiveAll('passing'), { signal });
   root.addEventListener('dragover', (event) => event.preventDefault(), { signal });
-  root.addEventListener('drop', (event) => onDrop(event, files.take), { signal });
+  root.addEventListener('drop', (event) => onDrop(event, files), { signal });
   const counting = window.setInterval(() => {
     showSamples(element, viewport, picture.stage);
     showDifference(element, viewport);
@@ -279,11 +282,14 @@ function onKey(event, { store, save }) {
   act();
 }
 
-function onDrop(event, take) {
-  const [file] = event.dataTransfer?.files ?? [];
-  if (!file) return;
+/** Takes files, or the name of a preset that is dragged as text; text that is dropped into a field is the field's. */
+function onDrop(event, { takeAll, openPreset }) {
+  const list = [...(event.dataTransfer?.files ?? [])];
+  const name = event.dataTransfer?.getData('text/plain').trim();
+  if (!list.length && (!name || event.target.matches?.('input, textarea'))) return;
   event.preventDefault();
-  take(file);
+  if (list.length) takeAll(list);
+  else openPreset(name);
 }
 
 const counted = (count, noun) => `${count} ${noun}${count === 1 ? '' : 's'}`;

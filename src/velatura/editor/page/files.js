@@ -1,7 +1,7 @@
 // Materials, light, objects and textures from and to files, folders and addresses.
 
 import { readPicture } from './render/environment.js';
-import { loadObject } from './render/load.js';
+import { contentsOf, loadObject } from './render/load.js';
 import { objectOf } from './render/loader.js';
 import * as commands from './state/commands.js';
 import { documentOf, enabled, leavesOf } from './state/material.js';
@@ -9,16 +9,20 @@ import { mixWith, objectionToMixing } from './state/parts.js';
 import { fragmentOf, readFragment } from './state/share.js';
 
 const LETTERS = 60; // of a file name
+export const FOREIGN = ['.mtlx', '.gltf', '.glb', '.xml']; // files of other programs that hold a material
+const IMAGES = /\.(png|jpe?g|exr|hdr)$/i;
+const OBJECT = 'The object';
+const TOLD = 3; // parameters in a message
 const DROPPED = 'file:'; // before the names of environments and objects that were dropped on the page
 
 /**
  * What can be done with files.
  *
- * @param {{store, session, call, storage, messages, address: string, saved: function, conflict: function, offer: function,
- *   copy: function}} services `saved()` after the disk has changed; `conflict(file, error)` where it was changed by others;
+ * @param {{store, session, call, lacks, storage, messages, address: string, ask: function, saved: function, conflict: function,
+ *   offer: function, copy: function}} services `ask(title, options)` of views/choice.js; `saved()` after the disk has changed; `conflict(file, error)` where it was changed by others;
  *   `offer(blob, name)` hands a file to the browser, `copy(text)` to the clipboard
  */
-export function createFiles({ store, session, call, storage, messages, address, saved, conflict, offer, copy }) {
+export function createFiles({ store, session, call, lacks, storage, messages, address, ask, saved, conflict, offer, copy }) {
   const dropped = async (name) => {
     const plain = name.slice(DROPPED.length);
     const file = await storage.get(plain);
@@ -31,12 +35,29 @@ export function createFiles({ store, session, call, storage, messages, address, 
       throw new Error('The browser does not let the page write to the clipboard.');
     });
 
+  /** Has `take` called with the material of a file of another program, of the folder or in `data`: with one of several. */
+  async function importFile(question, take) {
+    const { file } = question;
+    let answer = await call('import', question);
+    if (answer.names) {
+      const name = await ask(`${file} holds ${answer.names.length} materials`, answer.names);
+      if (name === undefined) return;
+      answer = await call('import', { ...question, name });
+    }
+    take(answer.material, { imported: { file, left: answer.left } });
+  }
+
   const files = {
     // Materials
 
     open(material, place) {
       store.run(commands.openMaterial, material, place);
-      messages.say(`Opened ${material.name || 'a material'}.`);
+      messages.say(`Opened ${material.name || 'a material'}.${remarks(place?.imported)}`);
+    },
+    openPreset(name) {
+      const known = session.presets.find((preset) => preset.name === name);
+      if (known) return files.open(known.material);
+      return messages.complain('drop', `${name.slice(0, LETTERS)}: is not the name of a preset`, { passing: true });
     },
     /** A new material: a coat over a diffuse base. */
     fresh: () => ({ layers: ['interface', 'diffuse'].map((kind) => ({ [kind]: session.layers[kind].fresh })) }),
@@ -44,23 +65,26 @@ export function createFiles({ store, session, call, storage, messages, address, 
       store.run(commands.openMaterial, files.fresh());
       messages.say('A new material, not in a file yet.');
     },
-    openFile: (file) =>
+    openFile: (file, take = files.open) =>
       messages.attempt('open', async () => {
+        if (isForeign(file)) return importFile({ file }, take);
         const { material, version } = await call('open', { file });
-        files.open(material, { file, version });
+        return take(material, { file, version });
       }),
     readFile: (file, take = files.open) =>
       messages.attempt('open', async () => {
-        take((await call('read', { text: await file.text(), file: file.name })).material);
+        if (isForeign(file.name)) return importFile({ file: file.name, data: await base64(file) }, take);
+        return take((await call('read', { text: await file.text(), file: file.name })).material);
       }),
+    /** Reads the material of a chosen file, or takes its object where that is asked for. */
+    readChosen: (file, take = files.open) => (isGltf(file.name) ? files.takeGltf(file, take) : files.readFile(file, take)),
     /** Puts a material beside the open one, on a share of the surface. */
-    mix(material) {
+    mix(material, place) {
       const wrong = objectionToMixing(store.get(), material);
       if (wrong) return messages.complain('mix', wrong, { passing: true });
       store.run(mixWith, material);
-      return messages.say(`Mixed with ${material.name || 'a material'}.`);
+      return messages.say(`Mixed with ${material.name || 'a material'}.${remarks(place?.imported)}`);
     },
-    mixFile: (file) => messages.attempt('open', async () => files.mix((await call('open', { file })).material)),
     async save(file, version) {
       const material = documentOf(store.get());
       const off = leavesOf(store.get()).reduce((sum, { layers }) => sum + layers.length - enabled({ layers }).length, 0);
@@ -127,14 +151,37 @@ export function createFiles({ store, session, call, storage, messages, address, 
         store.run(commands.setView, { object: DROPPED + file.name });
         store.aside(commands.setCamera, null);
       }),
+    /** Takes what a .gltf or .glb holds: its object, one of its materials, or the one of both that is asked for. */
+    takeGltf: (file, take = files.open) =>
+      messages.attempt('object', async () => {
+        const { meshes, materials } = await contentsOf(file);
+        if (!meshes && !materials) throw new Error(`${file.name}: holds neither an object nor a material`);
+        if (!materials || lacks('import')) return files.takeObject(file);
+        if (!meshes) return files.readFile(file, take);
+        const chosen = await ask(`${file.name} holds an object and materials`, [OBJECT, 'A material']);
+        if (!chosen) return null;
+        return chosen === OBJECT ? files.takeObject(file) : files.readFile(file, take);
+      }),
+    /** Takes files dropped at once: one, or a material with its images, which are put into the folder. */
+    async takeAll(list) {
+      const material = list.length > 1 && list.find(({ name }) => isForeign(name));
+      if (!material) return files.take(list[0]);
+      await messages.attempt('images', async () => {
+        for (const image of list.filter(({ name }) => IMAGES.test(name)))
+          if ((await files.upload(image)) !== image.name) throw new Error(`${image.name}: another image of the folder has this name`);
+        await files.take(material);
+      });
+    },
     /** Opens a file dropped on the page, by its ending. */
     take(file) {
       if (/\.(ya?ml|json)$/i.test(file.name)) return files.readFile(file);
       if (/\.(hdr|exr)$/i.test(file.name)) return files.takeEnvironment(file);
-      if (/\.(glb|gltf|obj)$/i.test(file.name)) return files.takeObject(file);
+      if (isGltf(file.name)) return files.takeGltf(file);
+      if (isForeign(file.name)) return files.readFile(file);
+      if (/\.obj$/i.test(file.name)) return files.takeObject(file);
       return messages.complain(
         'drop',
-        `${file.name}: drop a material (.yaml, .json), light (.hdr, .exr) or an object (.glb, .gltf, .obj) here,` +
+        `${file.name}: drop a material (.yaml, .json, ${FOREIGN.join(', ')}), light (.hdr, .exr) or an object (.glb, .gltf, .obj) here,` +
           ' a texture on its value',
         { passing: true },
       );
@@ -155,6 +202,17 @@ export function createFiles({ store, session, call, storage, messages, address, 
     },
   };
   return files;
+}
+
+const isForeign = (name) => FOREIGN.some((ending) => name.toLowerCase().endsWith(ending));
+const isGltf = (name) => /\.(glb|gltf)$/i.test(name);
+
+/** What an import has left, as a sentence: a few parameters by name. */
+function remarks(imported) {
+  if (!imported?.left.length) return '';
+  const names = imported.left.slice(0, TOLD).map((line) => line.split(' ')[0]);
+  const more = imported.left.length > TOLD ? ', \u2026' : '';
+  return ` Not carried from ${imported.file}, or not as it was: ${names.join(', ')}${more}. Layers has the reasons.`;
 }
 
 async function base64(file) {

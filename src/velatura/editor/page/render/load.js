@@ -22,13 +22,29 @@ export async function loadObject(file, plinth = []) {
     throw new Error(`${file.name}: not a readable object (${error.message ?? error})`, { cause: error });
   }
   const meshes = [];
-  root.updateMatrixWorld(true);
-  root.traverse((child) => {
+  root?.updateMatrixWorld(true); // none where a file has no scene
+  root?.traverse((child) => {
     if (child instanceof Mesh) meshes.push(part(child));
   });
   if (meshes.length === 0) throw new Error(`${file.name}: there is no surface in it`);
   stand(meshes);
   return { parts: [...meshes, ...plinth], view: VIEW };
+}
+
+const HEAD = 20; // bytes of a .glb before its JSON
+const LITTLE = true;
+
+/** The numbers of `meshes` and `materials` that a .gltf or .glb declares. */
+export async function contentsOf(file) {
+  const bytes = await file.arrayBuffer();
+  const isBinary = bytes.byteLength >= HEAD && new DataView(bytes).getUint32(0, LITTLE) === 0x46546c67;
+  const text = isBinary ? bytes.slice(HEAD, HEAD + new DataView(bytes).getUint32(12, LITTLE)) : bytes;
+  try {
+    const { meshes, materials } = JSON.parse(new TextDecoder().decode(text));
+    return { meshes: meshes?.length ?? 0, materials: materials?.length ?? 0 };
+  } catch {
+    throw new Error(`${file.name}: is not a file of glTF`);
+  }
 }
 
 async function read(file) {

@@ -37,22 +37,25 @@ export function initial(material, session, place = {}) {
 
 export const openMaterial = titled(
   'open a material',
-  (state, material, { file = null, version = null, model = null, switches = {}, view = {} } = {}) => {
+  (state, material, { file = null, version = null, imported = null, model = null, switches = {}, view = {} } = {}) => {
     const document = Math.max(0, ...Object.keys(state.disk).map(Number)) + 1;
     const taken = setMaterial(state, material);
     const opened = { ...taken, ...(model && { model, switches }), view: { ...taken.view, ...view }, document };
-    return { ...opened, disk: { ...state.disk, [document]: { file, version, text: textOf(opened) } } };
+    return { ...opened, disk: { ...state.disk, [document]: { file, version, imported, text: textOf(opened) } } };
   },
 );
 
 /** The disk now holds this material under that name. */
 export const saved = titled('save', (state, material, file, version) => ({
   ...state,
-  disk: { ...state.disk, [state.document]: { file, version, text: JSON.stringify(material) } },
+  disk: { ...state.disk, [state.document]: { ...placeOf(state), file, version, text: JSON.stringify(material) } },
 }));
 
-/** Where the material lies on the disk: `{file, version}`, of nulls where it does not. */
-export const placeOf = (state) => state.disk[state.document] ?? { file: null, version: null, text: null };
+/**
+ * Where the material lies on the disk: `{file, version}`, of nulls where it does not; `imported`: the `file` of another program that
+ * it was read from, and what is `left` of that, in lines.
+ */
+export const placeOf = (state) => state.disk[state.document] ?? { file: null, version: null, imported: null, text: null };
 
 /** Whether the material differs from what was opened or saved. */
 export const isChanged = (state) => placeOf(state).text !== textOf(state);

@@ -9,6 +9,7 @@ import {
   enableLayer,
   moveLayer,
   numberOf,
+  placeOf,
   removeLayer,
   rename,
   setExterior,
@@ -42,7 +43,7 @@ export function createLayers(services) {
 function layers(panel) {
   const state = panel.store.get();
   return html`
-    ${top(panel, state)} ${parts(panel)}
+    ${top(panel, state)} ${notCarried(placeOf(state).imported)} ${parts(panel)}
     <ol class="layers">
       ${repeat(
         state.layers,
@@ -119,6 +120,18 @@ function top({ store, session, edits }, { name, exterior, thin }) {
     </label>
     ${flag({ label: 'Thin pane', value: thin, title: material.thin.doc, choose: (on) => store.run(setThin, on) })}
   </div>`;
+}
+
+/** What an import could not carry, or not as it was. */
+function notCarried(imported) {
+  if (!imported?.left.length) return nothing;
+  const { file, left } = imported;
+  return html`<details class="left">
+    <summary>Not carried from ${file}, or not as it was (${left.length})</summary>
+    <ul>
+      ${left.map((line) => html`<li>${line}</li>`)}
+    </ul>
+  </details>`;
 }
 
 // One layer ------------------------------------------------------------------------------------------

@@ -14,7 +14,7 @@ import { titleOf } from './strip.js';
 /**
  * The whole page: `view()`, and `show(face)`, which turns the panel to the layers or to their appearance.
  *
- * @param {object} parts views `toolbar`, `layers`, `strip`, `view` and `model` of what is in it, its `canvas`, and what it works on;
+ * @param {object} parts views `toolbar`, `choice`, `layers`, `strip`, `view` and `model` of what is in it, its `canvas`, and what it works on;
  *   `onFace()` is called after the panel has turned
  */
 export function createPage({ store, session, storage, edits, messages, picture, canvas, focus, update, lacks, onFace, ...parts }) {
@@ -102,6 +102,7 @@ export function createPage({ store, session, storage, edits, messages, picture, 
       </div>
       ${section('View', 'view', parts.view())} ${section('Model', 'model', parts.model())}
     </aside>
+    ${parts.choice()}
   `;
 
   function section(title, key, content) {

@@ -4,6 +4,7 @@ import { html, nothing } from 'lit-html';
 import { live } from 'lit-html/directives/live.js';
 import { ref, createRef } from 'lit-html/directives/ref.js';
 import { isChanged, placeOf } from '../state/commands.js';
+import { FOREIGN } from '../files.js';
 import { iconButton } from './controls.js';
 import { createExports } from './exporting.js';
 
@@ -87,16 +88,20 @@ function openPanel(bar) {
   const close = () => bar.dialogs.open.value.close();
   const { mixing } = bar, take = mixing ? bar.files.mix : bar.files.open;
   const sought = bar.sought.trim().toLowerCase();
-  const found = (entries) => entries.filter(({ title }) => title.toLowerCase().includes(sought));
+  const found = (entries) => entries.filter(({ title, name = '' }) => [title.toLowerCase(), name].some((text) => text.includes(sought)));
   const fromHere = async () => {
-    const file = await bar.choose('.yaml,.yml,.json');
-    if (file) bar.files.readFile(file, take);
+    const file = await bar.choose(['.yaml', '.yml', '.json', ...(bar.lacks('import') ? [] : FOREIGN)].join());
+    if (file) bar.files.readChosen(file, take);
   };
   const seek = ({ target }) => {
     bar.sought = target.value;
     bar.update();
   };
+  const first = (event) => {
+    if (event.key === 'Enter') event.currentTarget.closest('dialog').querySelector('li button')?.click();
+  };
   const presets = bar.session.presets.map(({ name, title, group, material }) => ({
+    name,
     title,
     group,
     picture: bar.address && new URL(`thumbnails/${name}.jpg`, bar.address).href,
@@ -104,7 +109,7 @@ function openPanel(bar) {
   }));
   const groups = [...new Set(presets.map(({ group }) => group))].sort();
   const targets = (bar.targets ?? []).map((target) => ({ title: target.title, act: () => bar.openTarget(target) }));
-  const listed = (bar.listed ?? []).map((file) => ({ title: file, act: () => (mixing ? bar.files.mixFile : bar.files.openFile)(file) }));
+  const listed = (bar.listed ?? []).map((file) => ({ title: file, act: () => bar.files.openFile(file, take) }));
   const section = (title, entries, empty = nothing) => html`
     <h2>${title}</h2>
     ${entries.length ? nothing : empty}
@@ -118,7 +123,7 @@ function openPanel(bar) {
   };
   return html`<dialog class="open" aria-label=${mixing ? 'Mix with a material' : 'Open a material'} ${ref(bar.dialogs.open)}>
     <div class="head">
-      <input type="search" aria-label="Search" placeholder="Search" .value=${live(bar.sought)} @input=${seek} />
+      <input type="search" aria-label="Search" placeholder="Search" .value=${live(bar.sought)} @input=${seek} @keydown=${first} />
       ${
         mixing
           ? html`<button type="button" @click=${() => close() || take(bar.files.fresh())}>A new stack</button>`

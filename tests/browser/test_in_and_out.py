@@ -1,0 +1,176 @@
+"""Materials of other programs in the editor, in headless Chromium: dropped, opened, and written for others.
+
+Rationale: an artist comes with files of another program and leaves with such files, by drops, dialogs and downloads
+that only a browser has.
+"""
+
+from __future__ import annotations
+
+import io
+import json
+from collections.abc import Callable, Iterator
+from typing import Any
+
+import chromium
+import numpy as np
+import pytest
+from editor import Server, Tabs, Visit, unexpected
+from matplotlib.image import imsave
+
+import velatura as vt
+
+pytestmark = pytest.mark.skipif(bool(chromium.missing()), reason=chromium.missing())
+
+Open = Callable[..., Visit]
+REFUSED = "the server responded with a status of 4"
+
+SURFACE = """<open_pbr_surface name="{0}S" type="surfaceshader">
+    <input name="base_color" type="color3" {1}/>
+    <input name="coat_weight" type="float" value="1"/>
+    <input name="fuzz_weight" type="float" value="0.2"/>
+  </open_pbr_surface>
+  <surfacematerial name="{0}" type="material">
+    <input name="surfaceshader" type="surfaceshader" nodename="{0}S"/>
+  </surfacematerial>"""
+BLUE = 'value="0.1, 0.3, 0.6"'
+SCENE = """<scene version="3.0.0"><bsdf type="principled" id="Gilt"><rgb name="base_color" value="0.9, 0.6, 0.2"/>
+<float name="metallic" value="1"/><float name="roughness" value="0.3"/></bsdf></scene>"""
+TRIANGLE = {
+    "asset": {"version": "2.0"},
+    "scene": 0,
+    "scenes": [{"nodes": [0]}],
+    "nodes": [{"mesh": 0}],
+    "meshes": [{"primitives": [{"attributes": {"POSITION": 0}, "material": 0}]}],
+    "accessors": [
+        {"bufferView": 0, "componentType": 5126, "count": 3, "type": "VEC3", "min": [0, 0, 0], "max": [1, 1, 0]}
+    ],
+    "bufferViews": [{"buffer": 0, "byteLength": 36}],
+    "buffers": [
+        {
+            "byteLength": 36,
+            "uri": "data:application/octet-stream;base64,AAAAAAAAAAAAAAAAAACAPwAAAAAAAAAAAAAAAAAAgD8AAAAA",
+        }
+    ],
+    "materials": [{"name": "Steel", "pbrMetallicRoughness": {"roughnessFactor": 0.4}}],
+}
+
+
+def mtlx(*materials: str) -> str:
+    body = "\n".join(materials)
+    return f'<?xml version="1.0"?>\n<materialx version="1.39" colorspace="lin_rec709">\n{body}\n</materialx>'
+
+
+@pytest.fixture(scope="module")
+def tabs(opened: Any) -> Tabs:
+    return Tabs(opened)
+
+
+@pytest.fixture
+def visit(tabs: Tabs, served: Server) -> Iterator[Open]:
+    """Opens the page in a browser without a past; no console may complain of more than what is expected."""
+    expected: list[str] = []
+
+    def begin(*expecting: str) -> Visit:
+        expected.extend(expecting)
+        return tabs.visit(served.entrance)
+
+    yield begin
+    complaints = unexpected(tabs.forget(), expected)
+    for file in served.folder.iterdir():
+        file.unlink()
+    assert complaints == []
+
+
+def drop(page: Visit, *files: tuple[str, str | bytes], text: str = "") -> None:
+    """Drop files, or text, on the picture."""
+    given = [(name, list(data.encode() if isinstance(data, str) else data)) for name, data in files]
+    page.page.evaluate(
+        """([files, text]) => {
+          const dataTransfer = new DataTransfer();
+          for (const [name, bytes] of files) dataTransfer.items.add(new File([Uint8Array.from(bytes)], name));
+          if (text) dataTransfer.setData('text/plain', text);
+          const event = new DragEvent('drop', { dataTransfer, bubbles: true, cancelable: true });
+          document.querySelector('canvas').dispatchEvent(event);
+        }""",
+        [given, text],
+    )
+
+
+def said(page: Visit, text: str) -> None:
+    page.page.locator(".messages").get_by_text(text).wait_for()
+
+
+def button(page: Visit, name: str) -> Any:
+    return page.page.get_by_role("button", name=name, exact=True)
+
+
+# In ------------------------------------------------------------------------------------------------------------------
+
+
+def test_materials_of_other_programs_are_dropped_and_what_is_left_is_listed(visit: Open) -> None:
+    page = visit(REFUSED)
+    drop(page, ("painted.mtlx", mtlx(SURFACE.format("Painted", BLUE))))
+    said(page, "Opened Painted. Not carried from painted.mtlx, or not as it was: fuzz_weight.")
+    remarks = page.page.locator(".left")
+    remarks.locator("summary").click()
+    assert "fuzz_weight 0.2: a stack has no fibres above it" in remarks.inner_text()
+    assert [layer["kind"] for layer in page.state("layers")] == ["interface", "interface", "diffuse"]
+
+    drop(page, ("gilt.xml", SCENE))
+    said(page, "Opened Gilt")
+    drop(page, ("steel.gltf", json.dumps({"asset": {"version": "2.0"}, "materials": TRIANGLE["materials"]})))
+    said(page, "Opened Steel")
+    drop(page, text="coated-gold")
+    page.page.wait_for_function("() => velatura.store.get().layers[2]?.keys.conductor === 'Au'")
+    assert remarks.count() == 0
+
+    drop(page, text="no-such-thing")
+    said(page, "no-such-thing: is not the name of a preset")
+    drop(page, ("broken.mtlx", "<materialx"))
+    said(page, "broken.mtlx: ")
+    drop(page, ("empty.gltf", json.dumps({"asset": {"version": "2.0"}})))
+    said(page, "empty.gltf: holds neither an object nor a material")
+
+
+def test_one_of_several_materials_and_an_object_or_its_material_are_asked_for(visit: Open) -> None:
+    page = visit()
+    ask = page.page.locator("dialog.choice")
+    drop(page, ("two.mtlx", mtlx(SURFACE.format("Blue", BLUE), SURFACE.format("Red", 'value="0.6, 0.1, 0.1"'))))
+    ask.get_by_text("two.mtlx holds 2 materials").wait_for()
+    ask.get_by_role("button", name="Red").click()
+    said(page, "Opened Red")
+
+    drop(page, ("part.gltf", json.dumps(TRIANGLE)))
+    ask.get_by_text("part.gltf holds an object and materials").wait_for()
+    page.page.keyboard.press("Escape")
+    assert page.state("name") == "Red"
+    drop(page, ("part.gltf", json.dumps(TRIANGLE)))
+    ask.get_by_role("button", name="The object").click()
+    page.page.wait_for_function("() => velatura.store.get().view.object === 'file:part.gltf'")
+    drop(page, ("part.gltf", json.dumps(TRIANGLE)))
+    ask.get_by_role("button", name="A material").click()
+    said(page, "Opened Steel")
+    assert page.state("view.object") == "file:part.gltf"
+
+
+def test_a_file_of_the_folder_is_opened_with_its_image_and_one_is_mixed_in(visit: Open, served: Server) -> None:
+    image = io.BytesIO()
+    imsave(image, np.full((4, 4, 3), 0.5), format="png")
+    (served.folder / "gilt.xml").write_text(SCENE)
+    page = visit()
+    texture = '<image name="i" type="color3"><input name="file" type="filename" value="wood.png"/></image>'
+    drop(page, ("wood.mtlx", mtlx(texture, SURFACE.format("Wood", 'nodename="i"'))), ("wood.png", image.getvalue()))
+    said(page, "Opened Wood")
+    assert (served.folder / "wood.png").read_bytes() == image.getvalue()
+    assert page.state("layers.2.keys.albedo.texture") == "wood.png"
+    page.settled()
+
+    page.page.get_by_role("button", name="Mix with", exact=False).click()
+    page.page.get_by_role("button", name="gilt.xml").click()
+    said(page, "Mixed with Gilt")
+
+    page.page.get_by_role("button", name="Open", exact=True).click()
+    page.page.get_by_role("searchbox").fill("coated-lens")
+    page.page.keyboard.press("Enter")
+    page.page.wait_for_function("(name) => velatura.store.get().name === name", arg=vt.preset("coated-lens").name)
+    assert sorted(file.name for file in served.folder.iterdir()) == ["gilt.xml", "wood.png"]
