@@ -1013,7 +1013,15 @@ def test_what_is_exported_is_seen_before_it_is_taken(visit: Open, tmp_path: Path
     open_preset(page, "Gold")
     page.page.get_by_role("button", name="Export", exact=True).click()
     written = page.page.get_by_label("What is written")
-    page.page.get_by_label("Format", exact=True).select_option("python")
+    formats = page.page.get_by_label("Format", exact=True)
+    assert formats.locator("optgroup").evaluate_all("all => all.map(({ label }) => label)") == [
+        "Programs",
+        "Parameters",
+        "Shader code",
+    ]
+    untitled = "all => all.filter(({ value, textContent }) => value === textContent || !value).length"
+    assert formats.locator("option").evaluate_all(untitled) == 0
+    formats.select_option("python")
     page.page.wait_for_function("() => document.querySelector('dialog.export textarea')?.value.includes('import')")
     with page.page.expect_download() as download:
         page.page.get_by_role("button", name="Download .py").click()

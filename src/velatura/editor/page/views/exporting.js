@@ -6,17 +6,30 @@ import { decode } from '../arrays.js';
 import { documentOf } from '../state/material.js';
 import { flag, menu } from './controls.js';
 
-const TITLES = {
-  glsl: 'Shader, GLSL ES 3.00',
-  glsl450: 'Shader, GLSL 4.50',
-  vulkan: 'Shader, GLSL for Vulkan',
-  hlsl: 'Shader, HLSL',
-  slang: 'Shader, Slang',
-  wgsl: 'Shader, WGSL',
-  json: 'Numbers, JSON',
-  'mitsuba-xml': 'Scene of Mitsuba 3, XML',
-  python: 'Script, Python',
+/** Formats by what they are for, those that artists want first. */
+const GROUPS = {
+  Programs: {
+    blender: 'Blender, OSL in Cycles',
+    'blender-principled': 'Blender, Principled BSDF',
+    openpbr: 'OpenPBR, MaterialX',
+    gltf: 'glTF 2.0',
+    mtlx: 'MaterialX, by closures',
+    'mitsuba-principled': 'Mitsuba 3, principled',
+    'mitsuba-xml': 'Mitsuba 3, this plugin',
+    'bsdf-xml': 'WINDOW and Radiance, Klems matrices',
+  },
+  Parameters: { json: 'Numbers, JSON', python: 'Script, Python' },
+  'Shader code': {
+    osl: 'OSL',
+    glsl: 'GLSL ES 3.00',
+    glsl450: 'GLSL 4.50',
+    vulkan: 'GLSL for Vulkan',
+    hlsl: 'HLSL',
+    slang: 'Slang',
+    wgsl: 'WGSL',
+  },
 };
+const TITLES = Object.assign({}, ...Object.values(GROUPS));
 
 /** `view()`, and `show()`, which opens it. */
 export function createExports({ store, session, call, lacks, files, messages, update }) {
@@ -45,7 +58,11 @@ export function createExports({ store, session, call, lacks, files, messages, up
   function view() {
     const problem = messages.problems.find(({ about }) => about === 'export');
     const { fixed } = session.formats.find(({ name }) => name === asked.to);
-    const options = session.formats.map(({ name }) => [name, TITLES[name] ?? name, lacks(name)]);
+    const known = session.formats.map(({ name }) => name);
+    const option = (name) => [name, TITLES[name] ?? name, lacks(name)];
+    const offered = (titles) => Object.keys(titles).filter((name) => known.includes(name)).map(option);
+    const groups = Object.entries(GROUPS).map(([group, titles]) => ({ group, options: offered(titles) }));
+    const options = [...groups, ...known.filter((name) => !TITLES[name]).map(option)];
     return html`<dialog class="export" aria-label="Export" ${ref(dialog)}>
       <div class="head">
         ${menu({ label: 'Format', value: asked.to, options, choose: (to) => write({ to }) })}
