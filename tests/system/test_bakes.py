@@ -292,8 +292,9 @@ def test_blender_runs_the_script(files, monkeypatch) -> None:
 
 
 def test_the_command_says_the_loss_beside_the_file(run: Run, tmp_path: Path) -> None:
-    status, out, said = run("export", "varnished-paint", "--to", "gltf", "-o", str(tmp_path / "paint.gltf"))
-    assert status == 0 and out.strip() == str(tmp_path / "paint.gltf")
+    path = tmp_path / "paint.gltf"
+    status, out, said = run("export", "varnished-paint", "--to", "gltf", "-o", str(path))
+    assert status == 0 and out.strip() == f"{path}, and beside it {path}.json"
     assert "total variation:" in said and "not held: layer 1: absorption is part of the base's colour" in said
     status, _, said = run("export", "varnished-paint", "--to", "gltf", "-o", str(tmp_path / "paint.xml"))
     assert status == 2 and ".gltf" in said

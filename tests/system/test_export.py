@@ -51,22 +51,69 @@ def test_python_exports_what_the_command_writes(run: Run, tmp_path: Path) -> Non
         _, out, _ = run("export", "coated-gold", "--to", to, "--model", "belcour2018", "--set", "tir=off")
         assert made.text == out, to
         written = made.save(tmp_path / f"gold{FORMATS[to].endings[0]}")
-        assert [path.read_bytes() for path in written] == [made.text.encode(), *made.beside.values()]
+        facts = [made.described(written[0]).encode()] if made.facts else []
+        assert [path.read_bytes() for path in written] == [made.text.encode(), *made.beside.values(), *facts]
     files = {path.name for path in tmp_path.iterdir()}
-    shaders = {"gold.glsl", "gold.hlsl", "gold.osl", "gold.slang", "gold.wgsl", "gold.tables.bin"}
-    assert files == shaders | {"gold.json", "gold.mtlx", "gold.py", "gold.xml"}
+    described = {f"gold.{ending}" for ending in ("glsl", "hlsl", "osl", "slang", "wgsl", "mtlx", "py", "xml")}
+    assert files == described | {f"{name}.json" for name in described} | {"gold.json", "gold.tables.bin"}
     with pytest.raises(vt.InvalidInput, match="unknown format 'oslo'"):
         vt.export("coated-gold", "oslo")
     with pytest.raises(vt.InvalidInput, match=r"constant: only for glsl, .*wgsl.*, not for json"):
         vt.export("coated-gold", "json", constant=["layer0_eta"])
 
 
-def test_without_tables_there_is_one_file(run: Run, tmp_path: Path) -> None:
-    """Expected: a model that looks up no averages needs no texture."""
+def test_without_tables_there_is_no_texture(run: Run, tmp_path: Path) -> None:
+    """Expected: a model that looks up no averages needs none."""
     path = tmp_path / "gold.glsl"
     run("export", "coated-gold", "--to", "glsl", "--model", "weier2020", "--constant", "all", "-o", str(path))
-    assert [entry.name for entry in tmp_path.iterdir()] == ["gold.glsl"]
+    assert {entry.name for entry in tmp_path.iterdir()} == {"gold.glsl", "gold.glsl.json"}
     assert "vt_tables" not in path.read_text()
+    assert json.loads((tmp_path / "gold.glsl.json").read_text())["textures"] == []
+
+
+FACTS = [
+    ("glsl", ["--prefix", "gold"], "gold_baked", "RGBA32F"),
+    ("wgsl", ["--model", "belcour2018", "--half"], "vt_tables", "RGBA16F"),
+    ("hlsl", ["--model", "belcour2018", "--tables", "shared.bin"], "vt_tables", "RGBA32F"),
+]
+
+
+@pytest.mark.parametrize(("to", "options", "texture", "texel"), FACTS)
+def test_facts_suffice_to_load_a_shader(
+    to: str, options: list[str], texture: str, texel: str, run: Run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Expected: the file of each texture has the size that its facts state; all functions, uniforms and samplers that
+    they name are in the code."""
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "rough.png").touch()
+    albedo = {"texture": "rough.png"} if "belcour2018" in options else 0.2
+    layers = [{"interface": {"eta": 1.5, "alpha": 0.2}}, {"diffuse": {"albedo": albedo}}]
+    (tmp_path / "paint.yaml").write_text(json.dumps({"layers": layers}))
+    assert run("export", "paint.yaml", "--to", to, *options, "-o", f"paint.{to}")[0] == 0
+    facts, code = json.loads((tmp_path / f"paint.{to}.json").read_text()), (tmp_path / f"paint.{to}").read_text()
+    assert (facts["format"], facts["velatura"]) == (to, vt.__version__)
+    assert facts["model"]["name"] == ("belcour2018" if "belcour2018" in options else "velatura")
+    (read,) = facts["textures"]
+    assert (read["name"], read["format"], read["filter"]) == (texture, texel, "nearest")
+    size = {"RGBA16F": 8, "RGBA32F": 16}[texel]
+    assert len((tmp_path / read["file"]).read_bytes()) == read["width"] * read["height"] * size
+    assert len(facts["entry_points"]) == 3
+    assert all(re.search(rf"\b{name}\(", code) for name in facts["entry_points"])
+    assert all(place.split(".")[-1] in code for place in facts["uniforms"].values())
+    assert [each["file"] for each in facts["images"].values()] == ["rough.png"] * (albedo != 0.2)
+    assert all(name in code for name in [*facts["images"], read["name"]])
+
+
+@pytest.mark.parametrize("to", ["osl", "mtlx", "gltf"])
+def test_facts_state_the_loss_that_the_file_states(to: str, tmp_path: Path) -> None:
+    """Expected: total variations of both are the same, to the digits of the file's comments."""
+    made = vt.export("varnished-paint", to)
+    path = made.save(tmp_path / f"paint{FORMATS[to].endings[0]}")[-1]
+    loss = json.loads(path.read_text())["loss"]
+    assert [each["cosine"] for each in loss] == [1.0, 0.7, 0.35]
+    stated = [f"{100 * each['variation']:.1f}" if to == "gltf" else f"{each['variation']:.3f}" for each in loss]
+    text = " ".join(made.notes) if to == "gltf" else made.text
+    assert all(number in text for number in stated)
 
 
 def test_shared_tables_that_code_does_not_read_are_reported(run: Run, tmp_path: Path) -> None:

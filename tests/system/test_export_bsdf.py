@@ -26,7 +26,7 @@ def test_mitsuba_reflects_as_much_as_the_lobes_say(preset: str, bound: float, tm
     material and of a mixture, at any azimuth; and values are those of the stack where a fit compares them."""
     path, material = tmp_path / "a.bsdf", vt.preset(preset)
     made = vt.export(material, "bsdf")
-    assert made.save(path) == [path] and "of reflected light in total variation" in made.notes[0]
+    assert made.save(path)[0] == path and "of reflected light in total variation" in made.notes[0]
     mi, rng = kernel.mitsuba(), np.random.default_rng(0)
     measured = mi.load_dict({"type": "measured", "filename": str(path)})
     for cosine, phi in ((0.9, 0.0), (0.5, 2.0), (0.25, -1.0)):
@@ -54,7 +54,7 @@ def test_a_measurement_is_written_to_a_file_alone(run: Run, tmp_path: Path) -> N
     )
     path = tmp_path / "glass.bsdf"
     status, out, err = run("export", "frosted-glass", "--to", "bsdf", "-o", str(path))
-    assert (status, out) == (0, f"{path}\n") and "What passes is left out" in err
+    assert (status, out) == (0, f"{path}, and beside it {path}.json\n") and "What passes is left out" in err
     status, _, err = run("export", "dusty-varnish", "--to", "bsdf", "-o", str(tmp_path / "b.bsdf"))
     assert status == 2 and "part0_weight: a measurement is of one point, and has no textures" in err
     assert not (tmp_path / "b.bsdf").exists()

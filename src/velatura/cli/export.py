@@ -90,4 +90,4 @@ def export(
             print(f"not written without -o: the tables that the code reads ({', '.join(unwritten)})", file=sys.stderr)
         return
     path, *others = written
-    print(path if not others else f"{path}, and its tables {', '.join(map(str, others))}")
+    print(path if not others else f"{path}, and beside it {', '.join(map(str, others))}")

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import json
 
+import numpy as np
+
 from velatura.exports.request import Export, Request, relative
 from velatura.programs.fit import TARGETS, bake
 from velatura.stack import dumps
@@ -15,4 +17,8 @@ def write(request: Request) -> Export:
     folder = None if program.anywhere else request.folder
     files = {name: relative(image.texture.texture, folder) for name, image in made.images.items()}
     text = program.text(made, json.loads(dumps(request.material, "json", request.folder)), files)
-    return Export(text, notes=tuple(made.summary))
+    loss = [
+        {"cosine": cosine, "variation": float(variation), "albedo": float(np.max(np.abs(albedo)))}
+        for cosine, variation, albedo in zip(made.cos_theta, made.total_variation, (made.baked_albedo - made.albedo).T)
+    ]
+    return Export(text, notes=tuple(made.summary), facts={"loss": loss, "left_out": list(made.lost)})

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from velatura.exports.request import Export, Request, headed
+from velatura.exports.request import Export, Request, headed, of_closures
 from velatura.shader.printers.osl import osl
 
 
@@ -12,7 +12,8 @@ def write(request: Request) -> Export:
     return Export(
         _SCRIPT.format(
             name=request.material.name.strip() or "Velatura", turns=made.turns, shader=_literal(headed(made.text))
-        )
+        ),
+        facts={"loss": of_closures(made.losses)},
     )
 
 

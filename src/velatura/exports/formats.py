@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Collection
+from dataclasses import replace
 from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from velatura import files
 from velatura.errors import InvalidInput
-from velatura.exports.request import Export, Request
+from velatura.exports.request import LICENCE, Export, Request, facts_beside
 from velatura.programs import BAKED
+from velatura.version import __version__
 
 if TYPE_CHECKING:
     from velatura.model import Model
@@ -20,7 +22,8 @@ if TYPE_CHECKING:
 class Format(NamedTuple):
     """A format: how names of its files end, and the endings of what may lie beside them; the module that writes it.
 
-    `options` are those of `export` that it takes besides the model; `is_text` is whether a file of it is text.
+    `options` are those of `export` that it takes besides the model; `is_text` is whether a file of it is text, and
+    `has_facts` whether facts are written beside it.
     """
 
     endings: tuple[str, ...]
@@ -28,6 +31,7 @@ class Format(NamedTuple):
     beside: tuple[str, ...] = ()
     options: frozenset[str] = frozenset()
     is_text: bool = True
+    has_facts: bool = True
 
 
 _SHADERS = {
@@ -52,7 +56,7 @@ FORMATS: dict[str, Format] = {
     "osl": Format((".osl",), "velatura.exports.osl", options=frozenset({"constant"})),
     "blender": Format((".py",), "velatura.exports.blender"),
     "mtlx": Format((".mtlx",), "velatura.exports.mtlx"),
-    "json": Format((".json",), "velatura.exports.json"),
+    "json": Format((".json",), "velatura.exports.json", has_facts=False),
     "mitsuba-xml": Format((".xml",), "velatura.exports.mitsuba_xml"),
     "python": Format((".py",), "velatura.exports.python"),
     "bsdf": Format((".bsdf",), "velatura.exports.bsdf", is_text=False),
@@ -100,7 +104,7 @@ def export(
         InvalidInput: not a valid material, an unknown format, model, switch or value, or a material that the format
             does not hold.
     """
-    from velatura.model import DEFAULT, named
+    from velatura.model import DEFAULT, SWITCHES, named
     from velatura.stack import load
     from velatura.stack.schema import unknown
 
@@ -115,7 +119,16 @@ def export(
     chosen = named(DEFAULT if model is None else model, **switches)
     request = Request(to, load(material), chosen, switches, None if folder is None else Path(folder), options)
     written: Export = import_module(FORMATS[to].module).write(request)
-    return written
+    if not FORMATS[to].has_facts:
+        return written
+    facts = {
+        "format": to,
+        "material": request.material.name,
+        "model": {"name": chosen.name, **{switch: getattr(chosen, switch) for switch in SWITCHES}},
+        "velatura": __version__,
+        "licence": LICENCE,
+    }
+    return replace(written, facts={**facts, **written.facts})
 
 
 def check_writable(path: Path, to: str) -> None:
@@ -125,6 +138,8 @@ def check_writable(path: Path, to: str) -> None:
         InvalidInput: another ending, a folder that is missing, or a file that cannot be replaced.
     """
     files.check_writable(path, f"{to} output", FORMATS[to].endings)
+    if FORMATS[to].has_facts:
+        files.check_writable(facts_beside(path), "what belongs beside it", (".json",))
     for ending in FORMATS[to].beside:
         files.check_writable(path.with_suffix(ending), "what belongs beside it", (Path(ending).suffix,))
 

@@ -12,7 +12,7 @@ from xml.sax.saxutils import quoteattr
 
 import numpy as np
 
-from velatura.exports.request import Export, Request, origin, relative
+from velatura.exports.request import Export, Request, of_closures, origin, relative
 from velatura.model import Model
 from velatura.programs import xml
 from velatura.shader import closures, mixture
@@ -40,7 +40,7 @@ def write(request: Request) -> Export:
     nodes, halves = NodeGraph("value"), closures.shares(material)
     numbers = [(share, closures.numbers(part.stack)) for share, part in zip(halves, parts)]
     known = closures.side_by_side(halves, [part.recorded.known for part in parts])
-    losses = closures.losses(numbers, request.model, known)
+    losses = list(closures.losses(numbers, request.model, known))
 
     # Use the nodes of the stacks
     file = partial(relative, folder=request.folder)
@@ -65,7 +65,7 @@ def write(request: Request) -> Export:
         "</materialx>",
         "",
     ]
-    return Export("\n".join(lines))
+    return Export("\n".join(lines), facts={"loss": of_closures(losses)})
 
 
 @dataclass(frozen=True)

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from velatura.exports.request import Export, Request, headed
+from velatura.exports.request import Export, Request, headed, of_closures
 from velatura.shader.printers.osl import osl
 
 
 def write(request: Request) -> Export:
     """A shader with one output, a sum of closures; it holds all tables that it reads."""
-    return Export(headed(osl(request.material, request.model, request.constants).text))
+    made = osl(request.material, request.model, request.constants)
+    return Export(headed(made.text), facts={"entry_points": {made.name: {}}, "loss": of_closures(made.losses)})

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+import json
 import os
 import time
-from collections.abc import Collection, Mapping
-from dataclasses import dataclass, field
+from collections.abc import Collection, Iterable, Mapping, Sequence
+from dataclasses import asdict, dataclass, field
 from datetime import datetime, timezone
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 from velatura import files
 from velatura.errors import InvalidInput
@@ -16,6 +17,7 @@ from velatura.version import __version__
 
 if TYPE_CHECKING:
     from velatura.model import Model
+    from velatura.shader.closures import Loss
     from velatura.stack import Described
 
 LICENCE = "BSD-3-Clause"  # of code that is written
@@ -64,6 +66,18 @@ class Request:
         return api.bsdf(self.material, self.model)
 
 
+class Stored(NamedTuple):
+    """A texture in a file, in rows of little-endian numbers: its name in the code, the ending of the file or the path
+    of one that lies apart, the size in texels, and the format of a texel; `filter` is how the code reads it."""
+
+    name: str
+    file: str | Path
+    width: int
+    height: int
+    format: str
+    filter: str = "nearest"
+
+
 @dataclass(frozen=True)
 class Export:
     """A text, and the files that belong beside it, by ending: `.tables.bin` is `gold.tables.bin` beside `gold.glsl`.
@@ -72,6 +86,8 @@ class Export:
     costs: of code, what a call of each function costs, in words; notes: of parameters, what is lost, in
     sentences; of code, shared tables that it does not read.
     apart: files that several exports share, by path.
+    facts: what a program needs to know to use the file, as JSON: `gold.glsl.json` beside `gold.glsl`; none if empty.
+    textures: those of the code that lie in files, for the facts.
     """
 
     text: str
@@ -80,21 +96,40 @@ class Export:
     notes: tuple[str, ...] = ()
     apart: Mapping[Path, bytes] = field(default_factory=dict)
     data: bytes | None = None
+    facts: Mapping[str, Any] = field(default_factory=dict)
+    textures: Sequence[Stored] = ()
 
     def save(self, path: str | Path) -> list[Path]:
-        """Write the text to a file, and what belongs beside it; the files that were written, that of the text first.
+        """Write the text to a file, what belongs beside it, and the facts; the written files, that of the text first.
 
         Raises:
             InvalidInput: a file cannot be written; an existing file stays.
         """
         path = Path(path)
         others = {**{path.with_suffix(ending): data for ending, data in self.beside.items()}, **self.apart}
+        others |= {facts_beside(path): self.described(path).encode()} if self.facts else {}
         for other, data in others.items():
             with files.whole(other) as unfinished:
                 unfinished.write_bytes(data)
         with files.whole(path) as unfinished:
             unfinished.write_bytes(self.text.encode() if self.data is None else self.data)
         return [path, *others]
+
+    def described(self, path: Path) -> str:
+        """The facts in JSON, where the file has a path."""
+        textures = [
+            {**each._asdict(), "file": path.with_suffix(each.file).name}
+            if isinstance(each.file, str)
+            else {**each._asdict(), "file": relative(each.file, path.parent)}
+            for each in self.textures
+        ]
+        given = {**self.facts, "file": path.name, "textures": textures, "notes": self.notes}
+        return json.dumps(given, indent=2, ensure_ascii=False, allow_nan=False) + "\n"
+
+
+def facts_beside(path: Path) -> Path:
+    """The file of the facts of an export."""
+    return path.with_name(f"{path.name}.json")
 
 
 def relative(path: Path, folder: Path | None) -> str:
@@ -113,6 +148,11 @@ def origin() -> str:
     given = files.source_date()
     day = datetime.fromtimestamp(time.time() if given is None else given, timezone.utc)
     return f"Velatura {__version__}, {day:%Y-%m-%d}; SPDX-License-Identifier: {LICENCE}"
+
+
+def of_closures(losses: Iterable[Loss]) -> list[dict[str, float]]:
+    """The losses of closures, as facts have them."""
+    return [asdict(loss) for loss in losses]
 
 
 def headed(text: str) -> str:

@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
+from dataclasses import asdict
 from pathlib import Path
+from typing import Any
 
-from velatura.exports.request import Export, Request, headed
-from velatura.shader import shader
+from velatura.exports.request import Export, Request, Stored, headed, relative
+from velatura.shader import Shader, shader
 from velatura.shader.printers.c_like import CLike
 from velatura.shader.printers.glsl import Desktop, Glsl, Vulkan
 from velatura.shader.printers.hlsl import Hlsl, Slang
 from velatura.shader.printers.wgsl import Wgsl
-from velatura.shader.program import PREFIX
+from velatura.shader.program import PREFIX, described
 
 #: The language of each format.
 LANGUAGES: dict[str, type[CLike]] = {
@@ -41,9 +43,42 @@ def write(request: Request) -> Export:
 
     # Write its textures
     read = made.tables if made.looked_up else made.columns
-    textures = {".tables.bin": read, ".films.bin": made.films}
-    beside = {end: x.astype("<f2" if half else "<f4").tobytes() for end, x in textures.items() if x is not None}
-    apart = {Path(shared): beside.pop(".tables.bin")} if shared is not None and made.looked_up else {}
+    arrays = {".tables.bin": read, ".films.bin": made.films}
+    beside = {end: x.astype("<f2" if half else "<f4").tobytes() for end, x in arrays.items() if x is not None}
+    files: dict[str, str | Path] = {end: end for end in beside}
+    apart = {}
+    if shared is not None and made.looked_up:
+        files[".tables.bin"] = Path(shared)
+        apart = {Path(shared): beside.pop(".tables.bin")}
+    names = {".tables.bin": "tables" if made.looked_up else "baked", ".films.bin": "films"}
+    textures = [
+        Stored(f"{prefix}_{names[end]}", file, array.shape[1], array.shape[0], "RGBA16F" if half else "RGBA32F")
+        for end, file in files.items()
+        if (array := arrays[end]) is not None
+    ]
+
     notes = (f"{shared}: not written, since this code reads no tables that materials share",)
-    costs = {name: str(cost) for name, cost in made.costs.items()}
-    return Export(headed(made.text), beside, costs, notes if shared is not None and not apart else (), apart)
+    return Export(
+        headed(made.text),
+        beside,
+        costs={name: str(cost) for name, cost in made.costs.items()},
+        notes=notes if shared is not None and not apart else (),
+        apart=apart,
+        facts=_facts(made, printer.language, request.folder),
+        textures=textures,
+    )
+
+
+def _facts(made: Shader, language: str, folder: Path | None) -> dict[str, Any]:
+    """The language, the models that the code is of, its functions with their costs, the values of the struct, and the
+    images that samplers read."""
+    return {
+        "language": language,
+        "drawn_by": list(dict.fromkeys(described(part.recording.model) for part in made.parts)),
+        "entry_points": {name: asdict(cost) for name, cost in made.costs.items()},
+        "uniforms": dict(made.uniforms),
+        "images": {
+            name: {"file": relative(image.texture, folder), "encoding": image.encoding}
+            for name, image in made.maps.items()
+        },
+    }

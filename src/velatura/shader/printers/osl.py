@@ -132,11 +132,12 @@ OSL = Osl()
 
 @dataclass(frozen=True)
 class OslShader:
-    """The code, the name of its shader, and whether its lobes turn with the tangent."""
+    """The code, the name of its shader, whether its lobes turn with the tangent, and its difference from the model."""
 
     text: str
     name: str
     turns: bool
+    losses: Sequence[Loss]
 
 
 def osl(
@@ -247,7 +248,7 @@ class _Program:
         name, parameters = self._name(), ",\n".join(self._parameters(values))
         shader = "\n".join([f"shader {name}(", parameters, ")", "{", *_indented(body), "}", ""])
         turns = any(recording.variance(part.stack) is not Isotropic for part in self.parts)
-        return OslShader("\n".join([self._header(), *_helpers(shader), shader]), name, turns)
+        return OslShader("\n".join([self._header(), *_helpers(shader), shader]), name, turns, self.losses)
 
     def _parameters(self, values: Sequence[tuple[Address, Any]]) -> list[str]:
         """The declarations of values, of the files of textures, and of the place on the surface."""
