@@ -34,6 +34,7 @@ if TYPE_CHECKING:
     from velatura.exports import export
     from velatura.imports import from_gltf, from_openpbr, from_principled, from_standard_surface
     from velatura.model import MODELS, Model
+    from velatura.overview import show
     from velatura.stack import (
         Diffuse,
         Film,
@@ -60,6 +61,7 @@ _HOMES = {
     "velatura.exports": ("export",),
     "velatura.imports": ("from_gltf", "from_openpbr", "from_principled", "from_standard_surface"),
     "velatura.model": ("MODELS", "Model"),
+    "velatura.overview": ("show",),
     "velatura.stack": (
         "Diffuse",
         "Film",
@@ -116,6 +118,7 @@ __all__ = [
     "register",
     "render",
     "save",
+    "show",
     "sweep",
 ]
 

@@ -16,6 +16,7 @@ import subprocess
 import sys
 import time
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -28,6 +29,7 @@ from velatura.cli import options, progress
 from velatura.errors import MissingTool, NoSolution
 from velatura.inverse.lobes.target import Fixed, Target, TargetLobe, load_target
 from velatura.kernel import Component
+from velatura.model.lobe_statistics import LobeStatistics, StackLobes
 from velatura.scenes.stage import width_and_height
 
 Run = Callable[..., tuple[int, str, str]]
@@ -53,23 +55,21 @@ def calls(monkeypatch: pytest.MonkeyPatch) -> dict[str, Any]:
     """Puts stubs in the place of model and scenes, and notes what they are called with."""
     seen: dict[str, Any] = {}
 
-    def lobes(stack: Any, cos_theta: list[float], **options: Any) -> SimpleNamespace:
+    def lobes(stack: Any, cos_theta: list[float], **options: Any) -> StackLobes:
         seen.update(stack=stack, cos_theta=cos_theta, **options)
         n = len(cos_theta)
-        lobe = {
-            "energy": np.arange(3 * n).reshape(3, n) / 10,
-            "alpha": np.array([[0.1] * n, [0.2] * n]),
-            "rotation": np.full(n, math.pi / 6),
-            "covariance": np.arange(3 * n).reshape(3, n) + 1.0,
-            "own_alpha": np.array([[0.3] * n, [0.4] * n]),
-            "own_rotation": np.zeros(n),
-        }
-        transmitted = SimpleNamespace(**lobe) if seen.get("transmits") else None
-        lists = {field: [value, value] for field, value in lobe.items()}
-        others = {"remainder": np.full((3, n), 0.25), "passed": np.zeros((3, n)), "absorbed": np.full((3, n), 0.5)}
-        found = SimpleNamespace(**lists, transmitted=transmitted, **others)
-        found.parts = [found]
-        return found
+        lobe = LobeStatistics(
+            energy=np.arange(3 * n).reshape(3, n) / 10,
+            covariance=np.arange(3 * n).reshape(3, n) + 1.0,
+            alpha=np.array([[0.1] * n, [0.2] * n]),
+            rotation=np.full(n, math.pi / 6),
+            own_alpha=np.array([[0.3] * n, [0.4] * n]),
+            own_rotation=np.zeros(n),
+        )
+        incident = np.array([np.zeros(n), np.zeros(n), cos_theta])
+        transmitted = lobe if seen.get("transmits") else None
+        found = StackLobes.of(tuple(incident), [lobe, lobe], transmitted, np.full((3, n), 0.25))
+        return replace(found, passed=np.zeros((3, n)), absorbed=np.full((3, n), 0.5))
 
     def render(stack: Any, progress: Callable[[int, int], None], **options: Any) -> np.ndarray:
         seen.update(stack=stack, **options)

@@ -21,6 +21,7 @@ from velatura.benchmark.stacks import Case, chosen, known
 from velatura.benchmark.walks import Binned, truth
 from velatura.errors import InvalidInput
 from velatura.light.polar_bins import RADII
+from velatura.results import Fields
 
 Array = NDArray[np.floating]
 
@@ -56,8 +57,8 @@ class Record:
     __pydantic_config__: ClassVar[ConfigDict] = NUMBERS
 
 
-@dataclass(frozen=True)
-class Scores:
+@dataclass(frozen=True, repr=False)
+class Scores(Fields):
     """All records of a candidate; `asked` is their number if it expressed every stack, by kind; `refused` counts
     reasons; cost is that of an evaluation over one of `roughconductor`, None where it was not measured or is no plugin;
     edition is the number of that of the stacks.

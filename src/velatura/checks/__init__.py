@@ -63,7 +63,8 @@ def check(
     evidence = gather(Probe(bsdf, uv), other, also, lossless, seed, progress)
     alarm = 1 - (1 - FALSE_ALARMS) ** (1 / len(LAWS))
     judged = (law.judge(evidence, alarm) for law in LAWS)
-    report = Report(tuple(replace(found, declared=found.law in declared) for found in judged if found), FALSE_ALARMS)
+    findings = tuple(replace(found, declared=found.law in declared) for found in judged if found)
+    report = Report(findings, FALSE_ALARMS, subject)
 
     # Show what is broken
     if folder is not None:

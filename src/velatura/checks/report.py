@@ -4,9 +4,18 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from velatura.checks.probe import Array
+from velatura.errors import needs
+from velatura.results import Result, Table
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+MOST = 3.0  # value over bound, in a plot
+STYLES = {"kept": "green", "declared": "yellow", "broken": "red"}  # as Rich names them
+COLOURS = {"kept": "seagreen", "declared": "goldenrod", "broken": "crimson"}  # as Matplotlib
 
 
 @dataclass(frozen=True)
@@ -36,17 +45,19 @@ class Finding:
         return "kept" if self.passed else "declared" if self.declared else "broken"
 
 
-@dataclass(frozen=True)
-class Report:
+@dataclass(frozen=True, repr=False)
+class Report(Result):
     """The outcome of all laws.
 
     Args:
         findings: one for each law, in the order of LAWS.
         false_alarms: probability that a BSDF that keeps all laws is reported to break one, by chance.
+        subject: what was checked.
     """
 
     findings: tuple[Finding, ...]
     false_alarms: float
+    subject: str = ""
 
     @property
     def broken(self) -> tuple[str, ...]:
@@ -76,6 +87,35 @@ class Report:
             for finding in self.findings
         ]
         return {"passed": self.passed, "false_alarms": self.false_alarms, "laws": rows}
+
+    def as_tables(self) -> list[Table]:
+        """A row per law."""
+        numbers = ("value", "bound")
+        rows = [(f.law, f.status, f"{f.value:.4g}", f"{f.bound:.4g}", f.detail) for f in self.findings]
+        caption = f"false alarms: {self.false_alarms:g} of all reports"
+        return [Table(self.subject, ("law", "", *numbers, "detail"), rows, numbers, ("detail",), caption, STYLES)]
+
+    def plot(self, axes: Axes | None = None) -> Axes:
+        """The value of every law over its bound, as bars: green is kept, yellow declared, red broken.
+
+        Args:
+            axes: Matplotlib's to draw on, those of a new figure by default.
+
+        Raises:
+            MissingTool: the extra `plots` is not installed.
+        """
+        with needs("plots"):
+            from matplotlib import pyplot
+        height = 0.3 * len(self.findings) + 1
+        drawn = pyplot.subplots(figsize=(7, height), layout="constrained")[1] if axes is None else axes
+        shares = [min(f.value / f.bound if f.bound else float(f.value > 0), MOST) for f in self.findings]
+        places = range(len(self.findings))
+        drawn.barh(places, shares, color=[COLOURS[f.status] for f in self.findings])
+        drawn.axvline(1, color="black", linewidth=0.8)
+        drawn.set_yticks(places, [f.law for f in self.findings])
+        drawn.invert_yaxis()
+        drawn.set(title=self.subject, xlabel=f"value / bound, {MOST:g} at most")
+        return drawn
 
 
 def _finite(number: float) -> float | None:

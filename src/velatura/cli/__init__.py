@@ -40,6 +40,7 @@ from velatura.cli import (
     presets,
     render,
     schema,
+    show,
     simplify,
     substances,
     sweep,
@@ -64,6 +65,7 @@ app = typer.Typer(
 for verb in (
     render.render,
     lobes.lobes,
+    show.show,
     check.check,
     compare.compare,
     invert.invert,

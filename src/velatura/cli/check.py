@@ -4,19 +4,12 @@ from __future__ import annotations
 
 import json
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
 import typer
 
 from velatura.cli import options, progress
 from velatura.errors import LawBroken
-
-if TYPE_CHECKING:
-    from rich.table import Table
-
-    from velatura.checks import Report
-
-_STYLES = {"kept": "green", "declared": "yellow", "broken": "red"}
 
 
 def check(
@@ -40,23 +33,6 @@ def check(
     if as_json:
         print(json.dumps({"material": stack.name or material, "model": name, **report.to_dict()}, allow_nan=False))
     else:
-        options.console().print(_table(f"{stack.name or material} ({name})", report))
+        options.console().print(*report.as_tables())
     if not report.passed:
         raise LawBroken(f"{stack.name or material} ({name}) breaks a law: {', '.join(report.broken)}")
-
-
-def _table(title: str, report: Report) -> Table:
-    """A row per law."""
-    from rich.table import Table
-    from rich.text import Text
-
-    caption = f"false alarms: {report.false_alarms:g} of all reports"
-    table = Table("law", title=Text(title), title_justify="left", caption=caption, caption_justify="left")
-    table.add_column("")
-    for column in ("value", "bound"):
-        table.add_column(column, justify="right")
-    table.add_column("", overflow="fold")
-    for finding in report.findings:
-        status = Text(finding.status, _STYLES[finding.status])
-        table.add_row(finding.law, status, f"{finding.value:.4g}", f"{finding.bound:.4g}", Text(finding.detail))
-    return table

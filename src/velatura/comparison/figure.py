@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -45,20 +46,31 @@ def save_figure(comparison: Comparison, path: str | Path) -> None:
     Raises:
         InvalidInput, MissingTool: as `check_figure`.
     """
+    from matplotlib.figure import Figure
+
     target = check_figure(path)
-    figure = _draw(comparison)
+    figure = _drawn(comparison, Figure)
     with files.whole(target) as unfinished:
         figure.savefig(unfinished, dpi=120)
 
 
-def _draw(comparison: Comparison) -> Figure:
-    from matplotlib.figure import Figure
+def shown(comparison: Comparison) -> Figure:
+    """The figure among those of `pyplot`, which notebooks show.
 
+    Raises:
+        MissingTool: the extra `plots` is not installed.
+    """
+    with needs("plots"):
+        from matplotlib import pyplot
+    return _drawn(comparison, pyplot.figure)
+
+
+def _drawn(comparison: Comparison, new: Callable[..., Figure]) -> Figure:
     lobes, angles = len(comparison.lobe_names), len(comparison.cos_theta)
     shown = comparison.pictures
     columns = max(lobes, angles + 1)
     heights = (2, 1, len(comparison.models)) if shown else (2, 1)
-    figure = Figure(figsize=(_WIDTH * columns, _HEIGHT * sum(heights)), layout="constrained")
+    figure = new(figsize=(_WIDTH * columns, _HEIGHT * sum(heights)), layout="constrained")
     figure.suptitle(f"{comparison.name or 'Material'}: models against the truth, {comparison.paths} paths")
     parts: Any = figure.subfigures(len(heights), 1, height_ratios=heights)
     _draw_lobes(parts[0].subplots(2, lobes, squeeze=False, sharex=True), comparison)

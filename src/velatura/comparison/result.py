@@ -5,13 +5,17 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from velatura.model.guards import ALPHA_MIN
 from velatura.reference import WalkedLobe
+from velatura.results import Fields, Result, Table
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
 
 Array = NDArray[np.floating]
 
@@ -25,8 +29,8 @@ UNPOLARISED = "unpolarised"
 _FIELDS = {"energy": True, "alpha": True, "rotation": False, "mean": True, "covariance": True}
 
 
-@dataclass(frozen=True)
-class Account:
+@dataclass(frozen=True, repr=False)
+class Account(Fields):
     """The distribution of light for N directions of incidence, by a model or by the truth.
 
     reflected: lobes by the deepest interface from the top, a diffuse base last (NaN of a plugin, which has no lobes);
@@ -68,8 +72,8 @@ class Account:
         return cls(lobes("reflected"), lobes("transmitted"), evaluated, distribution, remainder)
 
 
-@dataclass(frozen=True)
-class Pictures:
+@dataclass(frozen=True, repr=False)
+class Pictures(Fields):
     """Spheres in linear RGB (height, width, 3), by the truth and by model.
 
     noise: the part of a root mean square error that is the truth's own noise.
@@ -84,8 +88,8 @@ class Pictures:
         return float(np.sqrt(np.mean((self.models[model] - self.truth) ** 2)))
 
 
-@dataclass(frozen=True)
-class Comparison:
+@dataclass(frozen=True, repr=False)
+class Comparison(Result):
     """A material by the truth and by each model.
 
     name: of the material; lobe_names: "R1", "R2", ... from the top, "D" for a diffuse base, "T" for what is
@@ -132,6 +136,64 @@ class Comparison:
         Roughness is clamped to the least one that a model evaluates. NaN if there is no such lobe.
         """
         return {name: float(np.mean(self._log_ratios(model))) for name, model in self.models.items()}
+
+    def as_tables(self) -> list[Table]:
+        """The lobes by direction and model; all that is reflected; and a row per model."""
+        return [self._lobe_table(), self._whole_table(), self._model_table()]
+
+    def brief(self) -> list[Table]:
+        """A row per model."""
+        return [self._model_table(f"{self.name or 'material'}: models against the truth, {self.paths} paths")]
+
+    def plot(self) -> list[Axes]:
+        """A new figure of lobes, total variation, the plane of incidence, and spheres if there are any; its axes.
+
+        Raises:
+            MissingTool: the extra `plots` is not installed.
+        """
+        from velatura.comparison import figure
+
+        return list(figure.shown(self).axes)
+
+    def _lobe_table(self) -> Table:
+        turned = any((lobe.rotation != 0).any() for lobe in self.truth.reflected)
+        numbers = ("energy", "alpha", *(["rotation"] if turned else []))
+        rows: list[Sequence[str] | None] = []
+        for i, cosine in enumerate(self.cos_theta):
+            for k, name in enumerate(self.lobe_names):
+                true, error = self.truth.lobes[k], self.standard_error[k]
+                energy = f"{_cell(true.energy, i)}{_plus_minus(error.energy, i)}"
+                alpha = f"{_cell(true.alpha, i, 4)}{_plus_minus(error.alpha, i)}"
+                rows.append((f"{cosine:g}", name, "truth", energy, alpha, *_rotation(true, i, turned)))
+                for model, account in self.models.items():
+                    lobe = account.lobes[k]
+                    cells = _cell(lobe.energy, i), _cell(lobe.alpha, i, 4), *_rotation(lobe, i, turned)
+                    rows.append(("", "", model, *cells))
+            rows.append(None)
+        return Table(self.name or "material", ("cos", "lobe", "", *numbers), rows, numbers)
+
+    def _whole_table(self) -> Table:
+        numbers = ("albedo", "as evaluated", "total variation")
+        rows: list[Sequence[str] | None] = []
+        for i, cosine in enumerate(self.cos_theta):
+            albedo = f"{_cell(self.truth.albedo, i)}{_plus_minus(self.albedo_error, i)}"
+            rows.append((f"{cosine:g}", "truth", albedo, "", f"noise {self.noise[i]:.4f}"))
+            for model, account in self.models.items():
+                variation = _number(self.total_variation[model][i])
+                rows.append(("", model, _cell(account.albedo, i), _cell(account.evaluated, i), variation))
+            rows.append(None)
+        return Table("All that is reflected", ("cos", "", *numbers), rows, numbers)
+
+    def _model_table(self, title: str = "") -> Table:
+        shown = self.pictures
+        numbers = ["mean |log(alpha/true)|", "mean total variation"]
+        numbers += [f"picture RMSE (noise {shown.noise:.4f})"] if shown else []
+        rows = []
+        for model in self.models:
+            values = [self.roughness_error[model], float(self.total_variation[model].mean())]
+            values += [shown.rmse(model)] if shown else []
+            rows.append((model, *map(_number, values)))
+        return Table(title, ("model", *numbers), rows, numbers)
 
     def _log_ratios(self, model: Account) -> Array:
         ratios: list[float] = []
@@ -184,3 +246,24 @@ def _plain(values: Any) -> Any:
     if np.ndim(values):
         return [_plain(value) for value in values]
     return float(values) if np.isfinite(values) else None
+
+
+def _cell(values: Any, i: int, digits: int = 3) -> str:
+    """The components of a quantity in direction i; one of them where they are all the same."""
+    numbers = [_number(x, digits) for x in values[:, i]]
+    return numbers[0] if len(set(numbers)) == 1 else " ".join(numbers)
+
+
+def _plus_minus(errors: Any, i: int) -> str:
+    """The largest standard error."""
+    error = errors[:, i].max()
+    return "" if np.isnan(error) else f" ± {error:.1g}"
+
+
+def _rotation(lobe: WalkedLobe, i: int, shown: bool) -> list[str]:
+    rotation = np.degrees(lobe.rotation[i])
+    return [] if not shown else ["-"] if np.isnan(rotation) else [f"{rotation:.0f}°"]
+
+
+def _number(x: float, digits: int = 4) -> str:
+    return "-" if np.isnan(x) else f"{x:.{digits}f}"

@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 from velatura import files
 from velatura.errors import InvalidInput
+from velatura.results import Fields
 from velatura.version import __version__
 
 if TYPE_CHECKING:
@@ -78,8 +79,8 @@ class Stored(NamedTuple):
     filter: str = "nearest"
 
 
-@dataclass(frozen=True)
-class Export:
+@dataclass(frozen=True, repr=False)
+class Export(Fields):
     """A text, and the files that belong beside it, by ending: `.tables.bin` is `gold.tables.bin` beside `gold.glsl`.
 
     data: the file itself in a format that is no text, which then is empty.

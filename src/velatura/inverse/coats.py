@@ -23,6 +23,7 @@ from velatura.model.papers.adding import lobes
 from velatura.model.papers.prepare import prepare
 from velatura.model.registry import stack_lobes
 from velatura.model.variance import Isotropic, PerAxis, Roughness, Variance
+from velatura.results import Fields
 from velatura.stack import (
     Diffuse,
     Film,
@@ -47,8 +48,8 @@ LEAST, FARTHEST = 1e-3, 3.0  # by which its energy, as a logarithm, and its vari
 Kept = tuple[tuple[Layer, ...], list[str]]  # layers below a coat, and what these cannot keep
 
 
-@dataclass(frozen=True)
-class Coated:
+@dataclass(frozen=True, repr=False)
+class Coated(Fields):
     """A coated stack, and the lobes at normal incidence without and with the coat: those of the stack come last.
 
     model: by which these are the lobes. diffuse: energy (3,) that a diffuse base scatters back up, without and with the

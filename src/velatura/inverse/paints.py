@@ -17,6 +17,7 @@ from numpy.typing import ArrayLike, NDArray
 from velatura import files, tables
 from velatura.errors import InvalidInput, one_line, within
 from velatura.optics import kubelka_munk
+from velatura.results import Fields
 from velatura.stack import (
     Address,
     Described,
@@ -117,8 +118,8 @@ def paint_colour(material: MaterialLike, specular: bool = False) -> Array:
 # Coefficients of a pigment -------------------------------------------------------------------------------------------
 
 
-@dataclass(frozen=True)
-class PigmentFit:
+@dataclass(frozen=True, repr=False)
+class PigmentFit(Fields):
     """K and S of a film, at N wavelengths.
 
     Attributes:
@@ -312,8 +313,8 @@ def _spread(slopes: Array) -> Array:
 # Concentrations of pigments ------------------------------------------------------------------------------------------
 
 
-@dataclass(frozen=True)
-class Paint:
+@dataclass(frozen=True, repr=False)
+class Paint(Fields):
     """A material whose pigments have the concentrations for a wished colour.
 
     Attributes:

@@ -16,14 +16,15 @@ from velatura.inverse.lobes.target import Target
 from velatura.inverse.local.dragged import seen
 from velatura.model import Model
 from velatura.ops import Value
+from velatura.results import Fields
 from velatura.stack import Stack
 
 EFFORTS = ((12, 32), (24, 128), (64, 512))  # indices tried between the interfaces of a pair, and partial stacks kept
 ALIKE = 1e-4  # by which the values of two stacks differ at least
 
 
-@dataclass(frozen=True)
-class Solution:
+@dataclass(frozen=True, repr=False)
+class Solution(Fields):
     """A stack with the lobes of a target, and the classes that its parts are chosen from.
 
     reached: the lobes of the stack, where these miss the target by more than rounding since so much is fixed.

@@ -92,4 +92,5 @@ def lobes(
     if not isinstance(material, Mix):
         return stack_lobes(material, cos_theta, phi, model, **switches)
     shares = material.weighted("lobes are those of one point; replace it, as in --set part0_weight=0.5")
-    return MixtureLobes([stack_lobes(stack, cos_theta, phi, model, **switches).times(share) for share, stack in shares])
+    parts = [stack_lobes(stack, cos_theta, phi, model, **switches).times(share) for share, stack in shares]
+    return MixtureLobes(parts, [" ".join(f"part{number}" for number in path) for path, _ in material.leaves()])

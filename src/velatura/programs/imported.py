@@ -5,7 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from velatura.errors import one_line, short
-from velatura.stack import Texture
+from velatura.results import Result, Table
+from velatura.stack import Texture, cross_section
 from velatura.stack.io import Loaded
 
 MOST = 100  # characters of a name, and of a value
@@ -23,12 +24,20 @@ class Left:
         return f"{self.parameter} {self.value}: {self.why}"
 
 
-@dataclass(frozen=True)
-class Imported:
+@dataclass(frozen=True, repr=False)
+class Imported(Result):
     """The stack or mixture nearest to a material of another program, and what is left of that."""
 
     stack: Loaded
     left: tuple[Left, ...] = ()
+
+    def as_tables(self) -> list[Table]:
+        """The layers, then a row for each parameter that is left."""
+        rows = [(each.parameter, each.value, each.why) for each in self.left]
+        return [
+            *cross_section.tables(self.stack),
+            *([Table("Left", ("parameter", "value", "why"), rows)] if rows else []),
+        ]
 
 
 class Notes:

@@ -12,6 +12,7 @@ from velatura.programs.closures import Array, ViewAndLight
 from velatura.programs.parameters import RGB, Input, Values
 from velatura.programs.surface import Alpha, Surface
 from velatura.programs.values import Value
+from velatura.results import Fields
 from velatura.stack import Texture
 from velatura.version import __version__
 
@@ -72,8 +73,8 @@ class Carried:
         return "rgba".index(self.texture.channel or "r")
 
 
-@dataclass(frozen=True)
-class Bake:
+@dataclass(frozen=True, repr=False)
+class Bake(Fields):
     """Parameters of a program, the target, that come closest to a stack, and what is lost.
 
     For the N cosines of incidence `cos_theta`, in the target's own formulas against the model: total_variation (N,),

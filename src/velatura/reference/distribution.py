@@ -10,13 +10,14 @@ from numpy.typing import ArrayLike, NDArray
 from velatura.light.square_bins import BINS, grids
 from velatura.optics.directions import directions
 from velatura.reference.batches import trace
+from velatura.results import Fields
 from velatura.stack import Described, MaterialLike, Stack, load
 
 Array = NDArray[np.floating]
 
 
-@dataclass(frozen=True)
-class Distribution:
+@dataclass(frozen=True, repr=False)
+class Distribution(Fields):
     """Energies (3, N, bins, bins) by colour and direction of incidence.
 
     The last two axes run over x and y of the outgoing direction, from -1 to 1. `transmitted` is None below an opaque

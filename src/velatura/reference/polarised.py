@@ -9,13 +9,14 @@ from numpy.typing import ArrayLike, NDArray
 
 from velatura.optics.directions import directions
 from velatura.reference.batches import Ends, ends, mean_and_error
+from velatura.results import Fields
 from velatura.stack import MaterialLike, single
 
 Array = NDArray[np.floating]
 
 
-@dataclass(frozen=True)
-class Stokes:
+@dataclass(frozen=True, repr=False)
+class Stokes(Fields):
     """Stokes parameters (4, 3, N) of lobes: I, Q, U and V by colour and direction of incidence.
 
     Each is that of the lobe's light together, over the intensity that comes in. I is the energy, (I + Q) / 2 that of s,

@@ -13,13 +13,14 @@ from velatura.optics import fresnel, ggx
 from velatura.optics.directions import directions
 from velatura.reference import roughness
 from velatura.reference.batches import ends, mean_and_error, relative_index
+from velatura.results import Fields
 from velatura.stack import Described, Interface, Layer, MaterialLike, Mix, Stack, load
 
 Array = NDArray[np.floating]
 
 
-@dataclass(frozen=True)
-class WalkedLobe:
+@dataclass(frozen=True, repr=False)
+class WalkedLobe(Fields):
     """One lobe, for N directions; or the standard errors of one.
 
     energy (3, N) by colour; mean (2, N) and covariance (3, N: xx, xy, yy) of the outgoing directions on the projected
@@ -34,8 +35,8 @@ class WalkedLobe:
     covariance: Array
 
 
-@dataclass(frozen=True)
-class Statistics:
+@dataclass(frozen=True, repr=False)
+class Statistics(Fields):
     """Lobes by the deepest interface, in lists from the top, and transmitted light (None below an opaque base).
 
     A diffuse base comes last, as an interface would. Light that a medium scatters back counts for the interface below
@@ -63,8 +64,8 @@ class Statistics:
         )
 
 
-@dataclass(frozen=True)
-class MixtureStatistics:
+@dataclass(frozen=True, repr=False)
+class MixtureStatistics(Fields):
     """The lobes of all stacks of a mixture, in `parts`, with energies times the shares of these.
 
     Lists run over the reflected lobes of all parts, one after the other, and `transmitted` over parts that transmit;

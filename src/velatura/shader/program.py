@@ -14,6 +14,7 @@ import numpy as np
 
 from velatura.errors import InvalidInput, remark
 from velatura.model import DEFAULT, SWITCHES, Model, named
+from velatura.results import Fields
 from velatura.shader.lookups import atlas, films
 from velatura.shader.lookups.lookup import LookUp, stacked
 from velatura.shader.material import filled as contents
@@ -31,8 +32,8 @@ _PREFIX = re.compile(r"(?!gl_)[A-Za-z](_?[A-Za-z0-9])*")
 _NAME = re.compile(r"\b(vt_|Vt(?=[A-Z])|VT_)")
 
 
-@dataclass(frozen=True)
-class Shader:
+@dataclass(frozen=True, repr=False)
+class Shader(Fields):
     """The code, the names of the tables that it looks up, and its uniforms.
 
     `uniforms` are the values that the struct of the material holds, or that `baked` reads: flat names (`layer0_eta`)

@@ -14,6 +14,7 @@ from typing import Annotated, Any, TypeAlias
 from pydantic import model_validator
 
 from velatura.errors import InvalidInput, within
+from velatura.stack import cross_section
 from velatura.stack.flat_names import Address
 from velatura.stack.flat_names import addressed as in_a_stack
 from velatura.stack.layers import Value
@@ -160,6 +161,14 @@ class Mix(Record):
                 return None
             parts.append(part.model_copy(update={"material": material}))
         return Mix(parts, name=self.name)
+
+    # As it is shown --------------------------------------------------------------------------------------------------
+
+    def __str__(self) -> str:
+        return cross_section.text(self)
+
+    def _repr_html_(self) -> str:
+        return cross_section.svg(self)
 
     # As a file holds it ----------------------------------------------------------------------------------------------
 

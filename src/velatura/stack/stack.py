@@ -8,7 +8,7 @@ from typing import Annotated, Any
 from pydantic import model_validator
 
 from velatura.errors import InvalidInput, within
-from velatura.stack import coatings, flat_names
+from velatura.stack import coatings, cross_section, flat_names
 from velatura.stack.flat_names import Address
 from velatura.stack.layers import (
     EXTERIOR,
@@ -139,6 +139,14 @@ class Stack(Record):
                 each = each.model_copy(update={"rotation": each.rotation + degrees})
             layers.append(each)
         return self.with_layers(layers)
+
+    # As it is shown --------------------------------------------------------------------------------------------------
+
+    def __str__(self) -> str:
+        return cross_section.text(self)
+
+    def _repr_html_(self) -> str:
+        return cross_section.svg(self)
 
     # As a file holds it ----------------------------------------------------------------------------------------------
 

@@ -14,6 +14,7 @@ from velatura.model import Model, named
 from velatura.model.base import Query
 from velatura.model.papers import bsdf, mixture
 from velatura.ops import Value
+from velatura.results import Fields
 from velatura.stack import Material, MaterialLike, single
 
 TILTS = (0.0, *np.geomspace(0.006, 1.6, 10))  # of half-vectors, as slopes: so that every lobe is met, sharp or blurred
@@ -24,8 +25,8 @@ LOWEST = 1e-3  # cosine of directions
 GROUPS, GROUP = 12, 10.0  # angles of incidence that are reported one by one; degrees of a group where there are more
 
 
-@dataclass(frozen=True)
-class Directions:
+@dataclass(frozen=True, repr=False)
+class Directions(Fields):
     """N pairs of unit vectors wi and wo, (3, N), both above the surface, and theta_i in degrees, (N,)."""
 
     wi: Array
@@ -118,8 +119,8 @@ class Directions:
         return Directions(wi, wo, self.theta_i)
 
 
-@dataclass(frozen=True)
-class ReflectanceTable:
+@dataclass(frozen=True, repr=False)
+class ReflectanceTable(Fields):
     """Reflectance f in 1/sr, without the cosine, of N pairs of directions: (3, N).
 
     energy: of all that is reflected from each of M directions wi, `directions.lit`, (3, M), where that counts.

@@ -25,6 +25,7 @@ from velatura.inverse.local.approach import Secants
 from velatura.model import Model, named, variance_kind
 from velatura.model.papers import bsdf
 from velatura.ops import Value
+from velatura.results import Fields
 from velatura.stack import (
     Material,
     MaterialLike,
@@ -73,8 +74,8 @@ class Other:
     error: float
 
 
-@dataclass(frozen=True)
-class Fit:
+@dataclass(frozen=True, repr=False)
+class Fit(Fields):
     """A stack that approximates a table, and its error.
 
     error: root mean square of the difference of log(1 + f cos theta_o); of a simplification together with ten times

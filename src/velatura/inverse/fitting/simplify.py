@@ -24,6 +24,7 @@ from velatura.inverse.reasons import Infeasible
 from velatura.inverse.solution import Solution
 from velatura.model import DEFAULT, Model, named, variance_kind
 from velatura.model.variance import Isotropic
+from velatura.results import Fields
 from velatura.stack import (
     Described,
     Diffuse,
@@ -95,8 +96,8 @@ def _form(target: Target) -> list[tuple[int, str]]:
     return [(lobe.interfaces, lobe.base) for lobe in target.lobes]
 
 
-@dataclass(frozen=True)
-class MixtureFit:
+@dataclass(frozen=True, repr=False)
+class MixtureFit(Fields):
     """A mixture with simpler stacks, and each of these as a fit, by the name of its part: `part0`, `part1_part0`.
 
     Stacks of as few interfaces as are kept, or fewer, are in the mixture alone.

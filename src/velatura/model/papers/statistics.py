@@ -23,6 +23,7 @@ def added(material: Material, model: Model, wi: Direction) -> StackLobes:
     axis = nearer_axis(material, np.zeros_like(wi[2]))
     base = under(with_means(prepared), wi)
     return StackLobes.of(
+        wi,
         [_collect(lobe, model, axis) for lobe in reflected],
         _collect(transmitted, model, axis) if material.transmits else None,
         np.broadcast_to(base.energy if base else 0.0, (3, len(wi[2]))).copy(),

@@ -29,7 +29,7 @@ from velatura.optics import ggx
 from velatura.optics.ggx import Direction
 from velatura.stack import InterfaceValues, Material, SlabValues
 
-Array = NDArray[np.floating]
+Array = NDArray[np.float64]
 
 NONE = np.zeros(0)  # directions at which the remainder, which has no lobe, is known
 
@@ -50,6 +50,7 @@ def solved_lobes(material: Material, model: Model, wi: Direction) -> StackLobes:
     frame = Frame.of(material)
     turn = np.radians(frame.degrees(material))
     axis = nearer_axis(material, np.arctan2(wi[1], wi[0]))
+    incident = wi
     material, wi = frame.back(material), ggx.rotate(wi, turn)
     cos_theta, phi = wi[2], np.arctan2(wi[1], wi[0])
     often = tables.load() if model.microsurface else None
@@ -58,7 +59,7 @@ def solved_lobes(material: Material, model: Model, wi: Direction) -> StackLobes:
     # Symmetry has the axes of isotropic stacks in the plane of incidence
     in_plane = phi if kind is Isotropic else None
 
-    def collect(energy: Array, own: Roughness, seen: Roughness) -> LobeStatistics:
+    def collect(energy: NDArray[np.floating], own: Roughness, seen: Roughness) -> LobeStatistics:
         own, seen = (with_axes_named(_turned(each, turn), axis) for each in (own, seen))
         return _lobe(energy, own, seen, model)
 
@@ -78,10 +79,10 @@ def solved_lobes(material: Material, model: Model, wi: Direction) -> StackLobes:
     if material.transmits:
         through = _passed(material, layout, found, kind, solved, wi)
         transmitted = collect(solved.passed, through, through)
-    return StackLobes.of(reflected, transmitted, _colours(solved.rest, phi))
+    return StackLobes.of(incident, reflected, transmitted, _colours(solved.rest, phi))
 
 
-def _lobe(energy: Array, own: Roughness, seen: Roughness, model: Model) -> LobeStatistics:
+def _lobe(energy: NDArray[np.floating], own: Roughness, seen: Roughness, model: Model) -> LobeStatistics:
     covariance = np.array(Covariance.of(seen, MAPS[model.map]).matrix())
     colours = _colours(energy, seen.rotation)
     return LobeStatistics(colours, covariance, np.array(seen[:2]), seen.rotation, np.array(own[:2]), own.rotation)
@@ -173,5 +174,5 @@ def _passed(
     return equivalent_roughness.roughness(samples)
 
 
-def _colours(energy: Array, phi: Array) -> Array:
+def _colours(energy: NDArray[np.floating], phi: Array) -> Array:
     return np.broadcast_to(energy, (3, len(phi))).copy()

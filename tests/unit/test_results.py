@@ -1,0 +1,165 @@
+"""Results as they show themselves: printed in a few lines, in notebooks, as labelled arrays, and drawn."""
+
+from __future__ import annotations
+
+import xml.etree.ElementTree as ElementTree
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import velatura as vt
+from velatura.results import LINES, Table, printed
+
+HOSTILE = '<script>alert(1)</script> & "quoted" [red]'
+COSINES = [1.0, 0.5]
+
+
+def mixture() -> vt.Mix:
+    return vt.Mix([(0.25, "frosted-glass"), (None, vt.preset("coated-gold"))])
+
+
+def table_of(count: int) -> vt.inverse.ReflectanceTable:
+    angles = np.linspace(0.0, 60.0, count)
+    directions = vt.inverse.Directions.of(angles, angles, np.full(count, 180.0))
+    return vt.inverse.table_of("coated-gold", directions, "bati2021")
+
+
+RESULTS: dict[str, Callable[[], Any]] = {
+    "stack": lambda: vt.preset("coated-gold"),
+    "many layers": lambda: vt.Stack([{"interface": {"eta": 1.3 + 0.01 * n}} for n in range(40)]),
+    "mixture": mixture,
+    "lobes": lambda: vt.lobes("coated-gold", np.linspace(0.1, 1.0, 50)),
+    "lobes of a mixture": lambda: vt.lobes(mixture(), COSINES),
+    "statistics": lambda: vt.reference.statistics("coated-gold", COSINES, paths=100),
+    "distribution": lambda: vt.reference.distribution("coated-gold", 0.7, paths=100),
+    "stokes": lambda: vt.reference.stokes("coated-gold", 0.7, paths=100),
+    "comparison": lambda: vt.compare("coated-gold", ["belcour2018"], [0.7], paths=100),
+    "report": lambda: vt.check("coated-gold", "belcour2018"),
+    "coat": lambda: vt.inverse.coat("coated-gold", 1.3),
+    "table": lambda: table_of(40),
+    "fit": lambda: vt.inverse.fit(table_of(12), ["coated-gold"], "bati2021"),
+    "model": lambda: vt.MODELS[-1],
+    "bsdf": lambda: vt.bsdf("coated-gold"),
+    "shader": lambda: vt.shader.shader("coated-gold"),
+    "export": lambda: vt.export("coated-gold", "glsl"),
+    "imported": lambda: vt.from_openpbr(base_metalness=0.5, specular_roughness=0.2, subsurface_weight=0.3),
+    "bake": lambda: vt.bakes.bake("coated-gold", "gltf"),
+    "directions": lambda: table_of(3).directions,
+}
+
+
+@pytest.mark.parametrize("name", RESULTS)
+def test_every_result_is_printed_in_a_few_lines(name: str) -> None:
+    text = repr(RESULTS[name]())
+    assert 0 < len(text.splitlines()) <= LINES
+    assert len(text) < 5000
+
+
+def test_a_stack_reads_as_its_repr() -> None:
+    stack = vt.preset("coated-gold")
+    assert eval(repr(stack), {**vars(vt), "Stack": vt.Stack, "Interface": vt.Interface, "Medium": vt.Medium}) == stack
+    text = str(stack)
+    assert "Coated brushed gold" in text
+    assert "conductor Au, alpha [0.1, 0.3], rotation 30" in text
+
+
+def test_lobes_know_their_directions() -> None:
+    found = vt.lobes("coated-gold", COSINES, phi=[0.3, 2.0])
+    assert np.allclose(found.cos_theta, COSINES, rtol=0, atol=1e-15)
+    assert found.phi[1] == pytest.approx(2.0)
+    assert list(found.named) == ["R1", "R2"]
+    assert list(vt.lobes(mixture(), 1.0).named) == ["part0 R1", "part0 R2", "part0 T", "part1 R1", "part1 R2"]
+
+
+@pytest.mark.parametrize("material", ["coated-gold", "mixture"])
+def test_lobes_as_labelled_arrays_are_the_same_numbers(material: str) -> None:
+    found = vt.lobes(mixture() if material == "mixture" else material, COSINES)
+    data, frame = found.to_xarray(), found.to_dataframe()
+    name = list(found.named)[-1]
+    lobe = found.named[name]
+    assert np.array_equal(data.energy.sel(lobe=name), lobe.energy)
+    assert np.array_equal(data.alpha.sel(lobe=name, axis="v"), lobe.alpha[1])
+    assert np.array_equal(data.cos_theta, COSINES)
+    total = data.energy.sum("lobe") + data.remainder + data.absorbed
+    assert np.allclose(total, 1, rtol=0, atol=1e-9)
+    rows = frame[frame.lobe == name]
+    assert np.array_equal(rows.energy_g, lobe.energy[1])
+    assert np.array_equal(rows.alpha_u, lobe.alpha[0])
+    assert len(frame) == len(found.named) * len(COSINES)
+
+
+def test_lobes_of_separate_channels_are_arrays_but_no_rows() -> None:
+    found = vt.lobes("coated-gold", COSINES, model="belcour2018", channels="separate")
+    assert found.to_xarray().alpha.dims == ("lobe", "channel", "axis", "direction")
+    with pytest.raises(vt.InvalidInput, match=r"to_xarray\(\)"):
+        found.to_dataframe()
+
+
+def test_plots_return_axes_of_matplotlib() -> None:
+    pyplot = pytest.importorskip("matplotlib.pyplot")
+    lobes, report = vt.lobes("frosted-glass", COSINES), vt.check("coated-gold", "belcour2018")
+    energy, alpha = lobes.plot()
+    legend = energy.get_legend()
+    assert legend is not None and [text.get_text() for text in legend.get_texts()] == ["R1", "R2", "T", "remainder"]
+    assert len(alpha.lines) == 2 * 3
+    bars = report.plot()
+    assert [label.get_text() for label in bars.get_yticklabels()] == [each.law for each in report.findings]
+    own = pyplot.figure().subplots()
+    assert report.plot(own) is own
+    pyplot.close("all")
+
+
+def test_names_in_notebooks_are_text() -> None:
+    stack = vt.preset("coated-gold").replace(name=HOSTILE)
+    for material in (stack, vt.Mix([(0.5, stack), (None, stack)])):
+        drawing = ElementTree.fromstring(material._repr_html_())
+        texts = [element.text for element in drawing.iter("{http://www.w3.org/2000/svg}text")]
+        assert any(HOSTILE in (text or "") for text in texts)
+        assert not list(drawing.iter("{http://www.w3.org/2000/svg}script"))
+    table = ElementTree.fromstring(Table(HOSTILE, [HOSTILE], [[HOSTILE]]).html())
+    assert [element.text for element in table.iter() if element.text] == [HOSTILE] * 3
+
+
+def test_markup_in_a_name_is_printed_as_it_is() -> None:
+    assert "[red]" in str(vt.preset("coated-gold").replace(name=HOSTILE))
+    assert "[red]" in printed([Table("[red]", ["a"], [["b"]])])
+
+
+def test_every_preset_has_a_drawing() -> None:
+    for name in vt.presets():
+        material = vt.preset(name)
+        drawing = ElementTree.fromstring(material._repr_html_())
+        bands = list(drawing.iter("{http://www.w3.org/2000/svg}polygon"))
+        assert len(bands) >= 2 * len(list(material.leaves()))
+
+
+def test_a_page_is_drawn_where_mitsuba_is_missing(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    pytest.importorskip("matplotlib")
+
+    def missing(*_: Any, **__: Any) -> None:
+        raise vt.MissingTool("Mitsuba is not installed: run `pip install mitsuba`")
+
+    monkeypatch.setattr("velatura.api.render", missing)
+    stack = vt.preset("coated-gold").replace(name="$x_$ [red] </svg>")
+    for material in (stack, vt.Mix([(0.3, stack), (None, "frosted-glass")])):
+        path = tmp_path / "page.svg"
+        figure = vt.show(material, path)
+        ElementTree.fromstring(path.read_text())
+        ball = next(
+            axes
+            for part in figure.subfigs
+            for axes in part.axes
+            if axes.texts and "Mitsuba" in axes.texts[0].get_text()
+        )
+        assert not ball.images
+
+
+def test_a_page_that_cannot_be_written_is_refused_first(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    pytest.importorskip("matplotlib")
+    monkeypatch.setattr("velatura.api.lobes", lambda *_, **__: pytest.fail("began"))
+    for name in ("page.txt", "no/page.png"):
+        with pytest.raises(vt.InvalidInput):
+            vt.show("coated-gold", tmp_path / name)
