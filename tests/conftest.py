@@ -5,8 +5,10 @@ from __future__ import annotations
 import gc
 import sys
 from collections.abc import Callable, Iterator
+from pathlib import Path
 
 import pytest
+import quick_kernels
 from hypothesis import settings
 
 from velatura import kernel
@@ -17,6 +19,11 @@ settings.register_profile("velatura", deadline=None, derandomize=True)
 settings.load_profile("velatura")
 
 Run = Callable[..., tuple[int, str, str]]
+
+
+def pytest_configure(config: pytest.Config) -> None:
+    if config.pluginmanager.hasplugin("cacheprovider"):
+        quick_kernels.compile_quickly(Path(config.cache.mkdir("kernels")))
 
 
 def pytest_collection_finish() -> None:
