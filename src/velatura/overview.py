@@ -2,24 +2,24 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from velatura import files
+from velatura.comparison import check_figure
 from velatura.errors import MissingTool, needs, short
 from velatura.model import DEFAULT, Model
 from velatura.model.lobe_statistics import StackLobes
+from velatura.optics import ggx
 from velatura.stack import MaterialLike, Mix, Stack, cross_section, load
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-SUFFIXES = (".png", ".webp", ".pdf", ".svg")
 INCIDENCE = np.pi / 4  # of the light on the drawing
 COSINES = np.cos(np.radians([0, 15, 30, 40, 50, 60, 65, 70, 75, 80, 85]))
 SECTION, ABOVE = 1.6, 1.1  # width of a cross-section, and how high lobes may rise above it
@@ -27,18 +27,6 @@ APART = 1.1  # from one section to the next, in widths
 BAND = 0.22  # height of a band
 UNEVEN = 0.06  # height of a surface of alpha 1
 ROOT = 3.0  # lobes are drawn by this root of their values
-
-
-def check_path(path: str | Path) -> Path:
-    """The path of a page, once it is sure that it can be drawn and written there.
-
-    Raises:
-        InvalidInput: it cannot be written there.
-        MissingTool: the extra `plots` is not installed.
-    """
-    with needs("plots"):
-        import matplotlib  # noqa: F401  (before what is slow)
-    return files.check_writable(path, "a page", SUFFIXES)
 
 
 def show(
@@ -71,18 +59,19 @@ def show(
         InvalidInput: not a valid material, an unknown model or switch, a texture, or a file that cannot be written.
         MissingTool: the extra `plots` is not installed.
     """
-    target = None if path is None else check_path(path)
+    target = None if path is None else check_figure(path)
     with needs("plots"):
         from matplotlib import pyplot
     from velatura import api
 
     described = load(material)
     lobes = api.lobes(described, COSINES, model=model, **switches)
+    drawn = api.lobes(described, np.cos(INCIDENCE), model=model, **switches)
     figure = pyplot.figure(figsize=(11, 7.5), layout="constrained")
     parts: Any = figure.subfigures(2, 1, height_ratios=(1.25, 1))
     upper, lower = parts
     sections, ball = upper.subplots(1, 2, width_ratios=(1.7, 1))
-    _draw_sections(sections, described, model, switches)
+    _draw_sections(sections, described, drawn.parts)
     try:
         picture = api.render(described, spp=spp, size=size, model=model, progress=progress, **switches)
     except MissingTool as error:
@@ -103,14 +92,12 @@ def show(
     return figure
 
 
-def _draw_sections(axes: Axes, material: Stack | Mix, model: str | Model, switches: dict[str, Any]) -> None:
+def _draw_sections(axes: Axes, material: Stack | Mix, lobes: Sequence[StackLobes]) -> None:
     """The stacks of a material side by side, each with its lobes above."""
-    from velatura import api
-
-    for n, (path, stack) in enumerate(material.leaves()):
+    for n, ((path, stack), own) in enumerate(zip(material.leaves(), lobes)):
         left = n * APART * SECTION
         _draw_bands(axes, stack, left)
-        _draw_lobes(axes, api.lobes(stack, np.cos(INCIDENCE), np.pi, model=model, **switches), left)
+        _draw_lobes(axes, own, left)
         if path:
             axes.text(left + SECTION / 2, ABOVE, " ".join(f"part{number}" for number in path), ha="center", va="bottom")
     axes.set_aspect("equal")
@@ -136,13 +123,15 @@ def _draw_lobes(axes: Axes, lobes: StackLobes, left: float) -> None:
     """Each lobe around the middle of the section, and the ray of light that makes them."""
     middle = left + SECTION / 2
     theta = np.linspace(-np.pi / 2 + 0.01, np.pi / 2 - 0.01, 721)
+    half = (theta - INCIDENCE) / 2
+    normal = np.sin(half), 0.0, np.cos(half)
     reflected = {name: lobe for name, lobe in lobes.named.items() if name != "T"}
     shapes = {}
     for name, lobe in reflected.items():
         across, along = lobe.alpha.reshape(-1, 2, lobe.alpha.shape[-1]).mean(axis=0)[::-1, 0]
         turned = float(np.mean(lobe.rotation))
         alpha = max(float(np.hypot(along * np.cos(turned), across * np.sin(turned))), 0.02)
-        shapes[name] = lobe.energy.mean() * _facets((theta - INCIDENCE) / 2, alpha)
+        shapes[name] = lobe.energy.mean() * ggx.ndf(normal, alpha, alpha)
     highest = max((float(shape.max()) for shape in shapes.values()), default=0.0)
     for n, (name, shape) in enumerate(shapes.items()):
         reach = 0.95 * ABOVE * (shape / highest) ** (1 / ROOT) if highest > 0 else 0 * shape
@@ -152,12 +141,6 @@ def _draw_lobes(axes: Axes, lobes: StackLobes, left: float) -> None:
         axes.text(x[peak], y[peak], name, color=f"C{n}", fontsize=8)
     start = (middle - SECTION / 2, SECTION / 2 / np.tan(INCIDENCE))
     axes.annotate("", (middle, 0.0), start, arrowprops={"arrowstyle": "->", "color": "0.3"})
-
-
-def _facets(angle: NDArray[np.float64], alpha: float) -> NDArray[np.float64]:
-    """GGX's density of normals over their angle."""
-    tangent = np.tan(angle)
-    return 1 / (np.pi * alpha**2 * np.cos(angle) ** 4 * (1 + (tangent / alpha) ** 2) ** 2)
 
 
 def _draw_numbers(axes: Axes, lobes: Any) -> None:

@@ -146,6 +146,11 @@ def printed(tables: Sequence[Table]) -> str:
     return "\n".join(line.rstrip() for line in captured.get().splitlines())
 
 
+def digits(value: float | tuple[float, ...]) -> str:
+    """A number or a colour in a message."""
+    return f"{value:.4g}" if isinstance(value, float) else "[" + ", ".join(f"{x:.4g}" for x in value) + "]"
+
+
 def numbers(values: Any, form: str = ".4f") -> str:
     """Numbers in a line; with one set of them per channel, a line each."""
     if values.ndim > 1:

@@ -62,7 +62,7 @@ IMPORTED_BY = {
     "benchmark": "__init__ cli figures",
     "cli": "__main__",
     "editor": "__init__ cli",
-    "comparison": "__init__ figures cli benchmark",
+    "comparison": "__init__ figures cli benchmark overview",
     "exports": "__init__ cli editor",
     "imports": "__init__ cli editor",
     "figures": "cli editor",

@@ -74,12 +74,11 @@ def invert(
       fixed       {eta, k, alpha, tau, films}: of each interface, or null: [1.5]
     Of the whole: exterior (1), eta_max (4), channels (mean or separate), name;
       start       a material, as a file has it, with which the search begins
-
       available   substances that interfaces may lie above: [water, bk7, 1.6, Au]
 
     Wishes beyond these, of lobes or of a start alone: energy, and angle (degrees):
 
-    
+    \b
       grazing     what is reflected at a second angle (75); lobe, alpha
       passed      what a pane passes; alpha, or haze in its place
       body        the colour of a base or scattering medium, seen from outside

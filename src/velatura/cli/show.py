@@ -26,9 +26,9 @@ def show(
     """
     stack, switches = options.read(material, settings)
     path = output or Path(f"{Path(material).stem}-page.png")
-    from velatura import overview
+    from velatura import comparison, overview
 
-    overview.check_path(path)
+    comparison.check_figure(path)
     with progress.bar(f"Drawing {path.name}") as advance:
         overview.show(stack, path, options.model_name(model), spp=spp, progress=advance, **switches)
     print(path)

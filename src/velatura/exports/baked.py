@@ -6,8 +6,9 @@ import json
 
 import numpy as np
 
-from velatura.exports.request import Export, Request, relative
+from velatura.exports.request import Export, Request, relative, stated
 from velatura.programs.fit import TARGETS, bake
+from velatura.shader.closures import Loss
 from velatura.stack import dumps
 
 
@@ -17,8 +18,6 @@ def write(request: Request) -> Export:
     folder = None if program.anywhere else request.folder
     files = {name: relative(image.texture.texture, folder) for name, image in made.images.items()}
     text = program.text(made, json.loads(dumps(request.material, "json", request.folder)), files)
-    loss = [
-        {"cosine": cosine, "variation": float(variation), "albedo": float(np.max(np.abs(albedo)))}
-        for cosine, variation, albedo in zip(made.cos_theta, made.total_variation, (made.baked_albedo - made.albedo).T)
-    ]
-    return Export(text, notes=tuple(made.summary), facts={"loss": loss, "left_out": list(made.lost)})
+    differences = np.abs(made.baked_albedo - made.albedo).max(axis=0)
+    losses = map(Loss, made.cos_theta, made.total_variation.tolist(), differences.tolist())
+    return Export(text, notes=tuple(made.summary), facts={"loss": stated(losses), "left_out": list(made.lost)})

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from velatura.exports.request import Export, Request, headed, of_closures
+from velatura.exports.request import Export, Request, headed, stated
 from velatura.shader.printers.osl import osl
 
 
@@ -13,7 +13,7 @@ def write(request: Request) -> Export:
         _SCRIPT.format(
             name=request.material.name.strip() or "Velatura", turns=made.turns, shader=_literal(headed(made.text))
         ),
-        facts={"loss": of_closures(made.losses)},
+        facts={"loss": stated(made.losses)},
     )
 
 

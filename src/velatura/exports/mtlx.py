@@ -12,7 +12,7 @@ from xml.sax.saxutils import quoteattr
 
 import numpy as np
 
-from velatura.exports.request import Export, Request, of_closures, origin, relative
+from velatura.exports.request import Export, Request, origin, relative, stated
 from velatura.model import Model
 from velatura.programs import xml
 from velatura.shader import closures, mixture
@@ -65,7 +65,7 @@ def write(request: Request) -> Export:
         "</materialx>",
         "",
     ]
-    return Export("\n".join(lines), facts={"loss": of_closures(losses)})
+    return Export("\n".join(lines), facts={"loss": stated(losses)})
 
 
 @dataclass(frozen=True)

@@ -151,8 +151,8 @@ def origin() -> str:
     return f"Velatura {__version__}, {day:%Y-%m-%d}; SPDX-License-Identifier: {LICENCE}"
 
 
-def of_closures(losses: Iterable[Loss]) -> list[dict[str, float]]:
-    """The losses of closures, as facts have them."""
+def stated(losses: Iterable[Loss]) -> list[dict[str, float]]:
+    """Losses, as facts have them."""
     return [asdict(loss) for loss in losses]
 
 

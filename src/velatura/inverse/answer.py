@@ -7,11 +7,10 @@ colours and by roughness. Values that no wish is about stay as they are.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import pairwise
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -21,7 +20,7 @@ from velatura.inverse.fitting.free_values import Free, FreeValues
 from velatura.inverse.fitting.simplify import first_stacks, with_media
 from velatura.inverse.invert import alternatives, invert_stack, model_of
 from velatura.inverse.lobes.partial_stack import Array
-from velatura.inverse.lobes.target import Target, TargetLobe, read
+from velatura.inverse.lobes.target import Target, TargetLike, TargetLobe, read
 from velatura.inverse.local.approach import Secants
 from velatura.inverse.reasons import Direction, Infeasible
 from velatura.inverse.wishes import KINDS
@@ -80,7 +79,7 @@ class Answer:
 
 
 def answer(
-    target: Target | Mapping[str, Any] | Sequence[Mapping[str, Any]] | str | Path,
+    target: TargetLike,
     model: str | Model = DEFAULT,
     **switches: str,
 ) -> Answer:
@@ -99,7 +98,7 @@ def answer(
 
 
 def answers(
-    target: Target | Mapping[str, Any] | Sequence[Mapping[str, Any]] | str | Path,
+    target: TargetLike,
     count: int,
     model: str | Model = DEFAULT,
     seed: int = 0,

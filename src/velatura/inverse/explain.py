@@ -13,9 +13,10 @@ import numpy as np
 from velatura.inverse import refined
 from velatura.inverse.lobes import stacks
 from velatura.inverse.lobes.target import BLUR, LEAST, Fixed, Target, TargetLobe, distance
-from velatura.inverse.reasons import TOO_LITTLE, TOO_MUCH, UNMET, Direction, Infeasible, because, digits
+from velatura.inverse.reasons import TOO_LITTLE, TOO_MUCH, UNMET, Direction, Infeasible, because
 from velatura.inverse.solution import exact
 from velatura.model import Model
+from velatura.results import digits
 
 EFFORT = ((12, 32), (24, 128))
 SHOWN = 3  # ways out, the nearest ones

@@ -3,9 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Mapping, Sequence
-from pathlib import Path
-from typing import Any
+from collections.abc import Sequence
 
 import numpy as np
 
@@ -13,7 +11,7 @@ from velatura.inverse import refined
 from velatura.inverse.explain import infeasible
 from velatura.inverse.lobes import sampling
 from velatura.inverse.lobes.partial_stack import Array
-from velatura.inverse.lobes.target import Target, read
+from velatura.inverse.lobes.target import Target, TargetLike, read
 from velatura.inverse.reasons import Direction
 from velatura.inverse.solution import EFFORTS, Solution, exact, in_closed_form, solutions
 from velatura.model import DEFAULT, Model, named
@@ -27,7 +25,7 @@ NARROWEST = 2 * ALPHA_MIN  # roughness of lobes below a rough interface
 
 
 def invert_stack(
-    target: Target | Mapping[str, Any] | Sequence[Mapping[str, Any]] | str | Path,
+    target: TargetLike,
     model: str | Model = DEFAULT,
     **switches: str,
 ) -> Solution:
@@ -81,7 +79,7 @@ def _smoothed(target: Target) -> Target:
 
 
 def alternatives(
-    target: Target | Mapping[str, Any] | Sequence[Mapping[str, Any]] | str | Path,
+    target: TargetLike,
     count: int,
     model: str | Model = DEFAULT,
     seed: int = 0,

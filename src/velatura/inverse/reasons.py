@@ -79,8 +79,3 @@ class Infeasible(NoSolution):
 def because(lobe: int, constraint: str, target: Target) -> str:
     """The reason in words."""
     return f"lobe {lobe + 1}: {REASONS[constraint].format(eta_max=target.eta_max)}"
-
-
-def digits(value: float | tuple[float, ...]) -> str:
-    """A number or colour in a message."""
-    return f"{value:.4g}" if isinstance(value, float) else "[" + ", ".join(f"{x:.4g}" for x in value) + "]"

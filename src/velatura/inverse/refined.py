@@ -24,11 +24,12 @@ from velatura.inverse.local.coordinates import Bound, plain
 from velatura.inverse.local.dragged import DraggedStack, seen
 from velatura.inverse.nearest import lobes_of
 from velatura.inverse.nearest import nearest as nearest_from
-from velatura.inverse.reasons import UNMET, Direction, digits
+from velatura.inverse.reasons import UNMET, Direction
 from velatura.inverse.solution import EFFORTS, Solution, closed_form_paths, in_closed_form, solutions
 from velatura.model import Model
 from velatura.model.roughness_maps import MAPS
 from velatura.model.variance import Isotropic, Roughness
+from velatura.results import digits
 from velatura.stack import Stack
 
 GREY = Bound(0, "colour", 1, 0.0)  # one index for all channels

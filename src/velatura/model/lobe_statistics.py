@@ -26,14 +26,14 @@ Array: TypeAlias = NDArray[np.float64]
 FAINTLY_BRUSHED = 0.01  # difference of two roughnesses, below which an interface hardly has axes
 LEAST = 0.00005  # energy that a table does not round to 0
 
-# A lobe's quantities, and whether their components (rgb, uv, ...) stand before the directions.
+# A lobe's quantities, and what their components are, which stand before the directions; empty of single numbers.
 FIELDS = {
-    "energy": True,
-    "alpha": True,
-    "rotation": False,
-    "covariance": True,
-    "own_alpha": True,
-    "own_rotation": False,
+    "energy": "channel",
+    "alpha": "axis",
+    "rotation": "",
+    "covariance": "entry",
+    "own_alpha": "axis",
+    "own_rotation": "",
 }
 OTHER_LIGHT = ("remainder", "passed", "absorbed")
 
@@ -133,19 +133,12 @@ class Lobes(Result):
         with needs("sweep"):
             import xarray
 
-        inner: dict[str, tuple[str, ...]] = {
-            "energy": ("channel",),
-            "alpha": ("axis",),
-            "rotation": (),
-            "covariance": ("entry",),
-            "own_alpha": ("axis",),
-            "own_rotation": (),
-        }
         data: dict[str, Any] = {}
-        for name, dims in inner.items():
+        for name, component in FIELDS.items():
             values = np.array([getattr(lobe, name) for lobe in self.named.values()])
-            separate = ("channel",) * (values.ndim - len(dims) - 2)  # one roughness for each, `channels=separate`
-            data[name] = ("lobe", *separate, *dims, "direction"), values
+            own = [component] if component else []
+            separate = ["channel"] * (values.ndim - len(own) - 2)  # one roughness for each, `channels=separate`
+            data[name] = ["lobe", *separate, *own, "direction"], values
         data |= {name: (("channel", "direction"), getattr(self, name)) for name in OTHER_LIGHT}
         channels = ["r", "g", "b"] if len(self.remainder) == 3 else range(len(self.remainder))
         coordinates = {

@@ -12,7 +12,7 @@ const LETTERS = 60; // of a file name
 export const FOREIGN = ['.mtlx', '.gltf', '.glb', '.xml']; // files of other programs that hold a material
 const IMAGES = /\.(png|jpe?g|exr|hdr)$/i;
 const OBJECT = 'The object';
-const TOLD = 3; // parameters in a message
+const NAMED = 3; // parameters in a message
 const DROPPED = 'file:'; // before the names of environments and objects that were dropped on the page
 
 /**
@@ -210,8 +210,8 @@ const isGltf = (name) => /\.(glb|gltf)$/i.test(name);
 /** What an import has left, as a sentence: a few parameters by name. */
 function remarks(imported) {
   if (!imported?.left.length) return '';
-  const names = imported.left.slice(0, TOLD).map((line) => line.split(' ')[0]);
-  const more = imported.left.length > TOLD ? ', \u2026' : '';
+  const names = imported.left.slice(0, NAMED).map((line) => line.split(' ')[0]);
+  const more = imported.left.length > NAMED ? ', \u2026' : '';
   return ` Not carried from ${imported.file}, or not as it was: ${names.join(', ')}${more}. Layers has the reasons.`;
 }
 

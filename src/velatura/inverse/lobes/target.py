@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated, Any, TypeAlias
 
 import numpy as np
 from pydantic import model_validator
@@ -363,7 +363,11 @@ def load_target(path: str | Path) -> Target:
         return _asked(fields)
 
 
-def read(target: Target | Mapping[str, Any] | Sequence[Mapping[str, Any]] | str | Path) -> Target:
+#: What a user may give for a target: one, the mapping of a target file, its lobes alone, or a file.
+TargetLike: TypeAlias = Target | Mapping[str, Any] | Sequence[Mapping[str, Any]] | str | Path
+
+
+def read(target: TargetLike) -> Target:
     """A target, unchanged, or from a mapping, from its lobes alone, or from a file."""
     if isinstance(target, Target):
         return target

@@ -10,6 +10,7 @@ import numpy as np
 from pydantic import model_validator
 
 from velatura.model.lobe_statistics import StackLobes
+from velatura.results import digits
 from velatura.stack import RGB, Stack
 from velatura.stack.schema import Parameter, Record
 from velatura.stack.spectra import lab
@@ -86,7 +87,7 @@ class Wish(Record):
 
     def words(self) -> str:
         """The wish in a message."""
-        values = (f"{key} {_digits(value)}" for key, value in self if value is not None and key in self.asked_for)
+        values = (f"{key} {digits(value)}" for key, value in self if value is not None and key in self.asked_for)
         return f"{self.key} {', '.join(values)}" + (f" at {self.angle:g} degrees" if self.angle else "")
 
 
@@ -122,7 +123,3 @@ def colour(energy: Array) -> Any:
     """An energy (3,) as a key has it."""
     r, g, b = map(float, np.clip(energy, 0.0, 1.0))
     return r if r == g == b else (r, g, b)
-
-
-def _digits(value: Any) -> str:
-    return f"{value:.4g}" if isinstance(value, float) else "[" + ", ".join(f"{x:.4g}" for x in value) + "]"
