@@ -25,7 +25,7 @@ from velatura.shader.recorder.graph import Graph, known_before
 from velatura.shader.recorder.seen import Seen, of_lobes
 from velatura.shader.recorder.symbol import Kind, Operand, Symbol, in_order
 from velatura.shader.recorder.tape import Tape
-from velatura.stack import Address, Described, Material, Stack, Varying, as_described
+from velatura.stack import Address, Described, Diffuse, Material, Stack, Varying, as_described
 from velatura.stack.schema import unknown
 
 LATER = ("wo.", "u.")  # inputs that are known after wi
@@ -156,7 +156,7 @@ def drawn_by(stack: Stack, model: Model) -> Model:
     if model.channels == "separate":
         raise InvalidInput("channels=separate: only for lobes and inverse, since a shader has one lobe for all colours")
     # In closed form a diffuse base alone is Lambert's law
-    return model if is_uniform(stack) and stack.interfaces else model.surrogate
+    return model if is_uniform(stack) and not isinstance(stack.layers[0], Diffuse) else model.surrogate
 
 
 def is_uniform(stack: Described) -> bool:
