@@ -23,6 +23,9 @@ BOUND = 0.01
 #: What is drawn as it is at every point, beside what is solved, within a mixture within another.
 BRUSHED = vt.Mix([(0.6, "turned-brushing"), (None, vt.Mix([(0.7, "glossy-plastic"), (None, "coated-gold")]))])
 
+#: Paint without any interface above its base.
+MATT = vt.Stack([vt.Medium(sigma_s=(4.0, 2.0, 1.0), sigma_a=0.2, g=0.5), vt.Diffuse(albedo=0.4)])
+
 
 @pytest.fixture(scope="module")
 def stage() -> Iterator[viewport.Stage]:
@@ -32,14 +35,18 @@ def stage() -> Iterator[viewport.Stage]:
 
 @pytest.mark.parametrize(
     ("material", "scene", "size", "samples", "spp"),
-    [(BRUSHED, "ball", 32, 512, 1024), (vt.preset("frosted-glass"), "sphere", 4, 24576, 24576)],
-    ids=["brushed", "frosted"],
+    [
+        (BRUSHED, "ball", 32, 512, 1024),
+        (vt.preset("frosted-glass"), "sphere", 4, 24576, 24576),
+        (MATT, "ball", 32, 512, 2048),
+    ],
+    ids=["brushed", "frosted", "matt"],
 )
 def test_a_still_converges_to_mitsuba(
     material: Described, scene: str, size: int, samples: int, spp: int, stage: viewport.Stage
 ) -> None:
-    """Expected: within .01 of white, a mixture with an anisotropic part on a curved body with a cavity, and through a
-    solid body."""
+    """Expected: within .01 of white, a mixture with an anisotropic part on a curved body with a cavity, through a solid
+    body, and of paint without any interface."""
     stage.resize(size, size)
     found = viewport.compare(stage, material, scene, "studio", samples, spp)
     assert found.noise < BOUND / 3

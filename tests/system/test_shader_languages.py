@@ -248,6 +248,12 @@ def test_a_black_material_has_a_shader(to: str) -> None:
     assert vt.export(black, to)
 
 
+def test_a_program_of_matt_paint_holds_values_that_change() -> None:
+    """Expected: a weight for the remainder and one for what passes, which no interface stands before."""
+    made = shader(vt.Stack([FOG, vt.Diffuse(albedo=0.4)]), values="uniforms")
+    assert made.baked is not None and list(made.shown) == ["remainder"]
+
+
 @pytest.mark.parametrize("to", ["osl", "mtlx"])
 def test_a_medium_on_an_interface_has_closures(to: str) -> None:
     """Its lower side ends with a medium. Expected: the stated difference in albedo, of light that goes straight through

@@ -343,7 +343,8 @@ class _WeighedSide(Side):
 
     def at(self, w: Direction) -> Columns:
         columns, numbers = super().at(w), [shape.interface for shape in self.shapes]
-        shown = [number(f"{SHOWN}[{k}]") for k in (*numbers, max(numbers) + 1, max(numbers) + 2)]
+        count = max(numbers, default=-1) + 1  # a base below media alone has no interface
+        shown = [number(f"{SHOWN}[{k}]") for k in (*numbers, count, count + 1)]
         *lobes, rest, through = shown
         kept = [x * (chance + FAINTLY) for x, chance in zip(shown, [*columns.chances, columns.chance])]
         passes = columns.passes
