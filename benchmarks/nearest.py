@@ -4,12 +4,13 @@
 
 Random stacks of the inverse are wished to have a lobe of other energy or blur, `--beyond` alone those that are not met.
 Answers under the hand, at rest and by `invert` must agree in energies and roughnesses. Beside each answer at rest that
-does not meet its wish, stacks are drawn within the bounds, by their coordinates: none that lies on the line to the
-wish may be nearer. Times are of the processor.
+does not meet its wish, stacks are drawn within the bounds, by their coordinates: none that lies near the line to the
+wish may lead to one on the line that is nearer. Times are of the processor.
 """
 
 from __future__ import annotations
 
+import dataclasses
 import sys
 import time
 from collections.abc import Iterator
@@ -19,14 +20,15 @@ from inverse import physical_targets
 from rows import parsed, row
 
 from velatura.inverse import Infeasible, Target, invert, invert_stack
-from velatura.inverse.local.coordinates import units
+from velatura.inverse.local.coordinates import Point, units
 from velatura.inverse.local.dragged import DraggedStack
 from velatura.inverse.local.line import Line
-from velatura.inverse.nearest import Nearest, nearest
+from velatura.inverse.nearest import READINGS, Nearest, nearest
 from velatura.model import DEFAULT, Model, named
 from velatura.model.variance import Roughness
 
-SAME, NEARER, ON_LINE = 2e-3, 0.02, 0.01  # differences of lobes, shares of the way, and of readings
+SAME, NEARER, BESIDE, ON_LINE = 2e-3, 0.02, 0.01, 1e-3  # differences of lobes, shares of the way, and of readings
+FOLLOWED = 3  # stacks near the line that lead on, at most
 CHANGE, BRIGHTEST, ROUGHEST = 1.5, 0.95, 0.9  # of wishes: the most, as a logarithm
 SPREAD = (1e-3, 1.0)  # of stacks that are drawn, in units of coordinates
 
@@ -65,16 +67,20 @@ def by_invert(present: DraggedStack, wish: Target, model: Model) -> Target:
 
 
 def nearer(present: DraggedStack, answer: Nearest, count: int, rng: np.random.Generator) -> float:
-    """The part of the way of the furthest of stacks that are drawn about an answer and lie on the line."""
+    """The part of the way of the furthest stack on the line that is reached from stacks drawn about an answer."""
     space, x = answer.stack.space, answer.stack.point.x
-    held, _ = answer.stack.constant(answer.wish)
+    held, caps = answer.stack.constant(answer.wish)
     spread = np.exp(rng.uniform(*np.log(SPREAD), (1, count))) * units(x)[:, None]
     points = np.clip(x[:, None] + spread * rng.normal(size=(len(x), count)), *(end[:, None] for end in space.box))
     points[held] = x[held, None]
     points = points[:, [space.broken(point, None) is None for point in points.T]]
-    line = Line(present.point, space.goal(present.now(answer.wish)), space.goal(answer.wish))
-    found = (line.placed(reading) for reading in space.read(points).T)
-    return max((part for part, off in found if off < ON_LINE), default=0.0)
+    line = Line(present.point, space.goal(present.now(answer.wish)), space.goal(answer.wish), held, caps)
+    part, off = np.transpose([line.placed(reading) for reading in space.read(points).T])
+    ahead = np.flatnonzero((off < BESIDE) & (part > answer.part + NEARER))
+    ends = []
+    for n in ahead[np.argsort(-part[ahead])][:FOLLOWED]:
+        ends.append(dataclasses.replace(line, start=Point(space, points[:, n])).last(READINGS[False]))
+    return max((end.part for end in ends if end.off < ON_LINE), default=0.0)
 
 
 def main() -> int:

@@ -87,6 +87,29 @@ def test_a_wish_gets_one_answer_by_all_ways() -> None:
     assert own[0, 0] > 3 * now.lobes[0].colour[0]
 
 
+def test_a_closed_form_gives_one_answer_under_the_hand_and_at_rest() -> None:
+    """A pair wished brighter than what its index allows, where a coarse search ends early."""
+    media = vt.Medium(sigma_a=(0.04, 0.0, 0.05))
+    pair = Stack([vt.Interface(eta=1.88, alpha=0.12), media, vt.Interface(eta=1.31, alpha=0.02)])
+    now = seen(pair, Target([{"energy": 0.1, "interfaces": 2}]), AVERAGED)
+    wish = now.with_energy(0, (0.445, 0.453, 0.443))
+    hand, rest = (answer(pair, wish, quick=quick) for quick in (True, False))
+    assert not rest.met and hand.exact and hand.part == rest.part
+
+
+def test_a_refusal_of_a_wish_from_a_material_offers_the_nearest_answer_first() -> None:
+    """A way out without the material reads the same, "lobe 1 energy 0.36", and comes after one of another form."""
+    glass = Stack([vt.Interface(eta=1.5)])
+    wish = Target([{"energy": 0.44}])
+    found = answer(glass, wish)
+    with pytest.raises(Infeasible) as error:
+        invert_stack(wish.model_copy(update={"start": glass}), AVERAGED)
+    first, *others = error.value.directions
+    assert first.target.start == found.stack.stack
+    assert first.target.lobes[0].colour == pytest.approx(found.reached.lobes[0].colour)
+    assert first.words not in [other.words for other in others]
+
+
 def test_a_refused_wish_leaves_the_material_as_it_is() -> None:
     """At the bound already: the material itself comes back, so that undo has no step of it."""
     glass = Stack([vt.Interface(eta=4.0)])

@@ -72,6 +72,7 @@ def nearest(present: DraggedStack, wish: Target, now: Target | None = None, quic
     now: the present lobes, where they are not quite those of a stack that can be dragged, as of metals by spectra.
     quick: by few readings of a slow model, under the hand.
     """
+    quick = quick and present.space.slow
     possible = present.achromatic(wish)
     grey = _colour_lost(present, wish, possible)
     if present.missed(possible, present.space.counted) < EXACT:
@@ -93,7 +94,7 @@ def nearest(present: DraggedStack, wish: Target, now: Target | None = None, quic
         found = _met(found, possible) or found
     if part < LEAST:
         found, part = present.renamed(present.now(possible)), 0.0
-    answer = Nearest(found, wish, part, exact=not (quick and present.space.slow))
+    answer = Nearest(found, wish, part, exact=not quick)
     if bound is not None:
         return dataclasses.replace(answer, lobe=bound.lobe, reason=_named(bound, wish))
     return _told(answer, grey or _colour_lost(present, wish, found.now(wish) if present.coloured else possible))

@@ -61,8 +61,11 @@ class Infeasible(NoSolution):
 
     def __init__(self, why: str, lobe: int, constraint: str, directions: list[Direction]) -> None:
         self.why, self.lobe, self.constraint = why, lobe, constraint
-        self.directions = list({direction.words: direction for direction in reversed(directions)}.values())[::-1]
-        hints = "; ".join(direction.words for direction in directions)
+        first: dict[str, Direction] = {}
+        for direction in directions:
+            first.setdefault(direction.words, direction)
+        self.directions = list(first.values())
+        hints = "; ".join(first)
         super().__init__(f"no stack: {why}" + (f" (possible: {hints})" if hints else ""))
 
     def nearer(self, way: Direction) -> Infeasible:
