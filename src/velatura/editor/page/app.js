@@ -23,6 +23,7 @@ import { createPage } from './views/page.js';
 import { createModel, createView } from './views/settings.js';
 import { createStrip } from './views/strip.js';
 import { createToolbar } from './views/toolbar.js';
+import { followScrubbing } from './views/scrubbing.js';
 import { followTyping, isTyping } from './views/typing.js';
 
 const KEPT = 250; // milliseconds after a change until it is stored
@@ -167,6 +168,7 @@ export function mount(root, { call, lacks = nothingLacks, live, session, storage
   canvas.addEventListener('webglcontextrestored', () => messages.forgive('device'), { signal });
   root.addEventListener('keydown', (event) => onKey(event, { store, save: lacks('save') ? files.download : toolbar.saveAgain }), { signal });
   followTyping(element, { signal });
+  followScrubbing(element, { signal });
   element.addEventListener('input', () => messages.forgiveAll('passing'), { signal });
   root.addEventListener('dragover', (event) => event.preventDefault(), { signal });
   root.addEventListener('drop', (event) => onDrop(event, files), { signal });

@@ -10,3 +10,9 @@ export function objection(value, { low = null, high = null, strict = false }) {
     ? `must lie in ${low} to ${high}${ends}`
     : `must be ${strict ? 'above' : 'at least'} ${low}`;
 }
+
+/** The number of a range that is nearest to another one, of six digits; undefined where its end is excluded. */
+export function nearest(value, spec) {
+  const found = Number(Math.max(spec.low ?? -Infinity, Math.min(spec.high ?? Infinity, value)).toPrecision(6));
+  return objection(found, spec) ? undefined : found;
+}

@@ -133,9 +133,10 @@ export function colour({ label, value, spec, edit, span = spanOf(spec), hsv = nu
     return html`<div class="grey">${number({ label, value, spec, edit, span })}${beside}</div>`;
   const whole = spec.high === 1 ? null : Math.max(...value) || 1;
   const channel = (index) => {
-    const one = entryOf(edit, value, index);
-    return html`<div class="channel ${CHANNELS[index]}">
-      ${number({ label: `${label}, ${CHANNELS[index]}`, value: value[index], spec, edit: one, span })}
+    const one = entryOf(edit, value, index), name = CHANNELS[index];
+    const own = { ...spec, default: channelsOf(spec.default)[index] };
+    return html`<div class="channel ${name}">
+      ${tag(name)} ${number({ label: `${label}, ${name}`, value: value[index], spec: own, edit: one, span })}
     </div>`;
   };
   return html`<div class="colour">
@@ -145,6 +146,8 @@ export function colour({ label, value, spec, edit, span = spanOf(spec), hsv = nu
     </div>
   </div>`;
 }
+
+const tag = (name) => html`<span class="tag" aria-hidden="true">${name[0].toUpperCase()}</span>`;
 
 function hueRows({ label, value, edit, hsv }) {
   if (hex(fromHsv(hsv.latest ?? [0, 0, 0])) !== hex(value)) hsv.latest = toHsv(value);
@@ -157,8 +160,7 @@ function hueRows({ label, value, edit, hsv }) {
     const spec = { low: 0, high: index === 0 ? 360 : 1 };
     const one = entryOf(all, hsv.latest, index);
     return html`<div class="channel">
-      <span class="tag" aria-hidden="true">${name[0].toUpperCase()}</span>
-      ${number({ label: `${label}, ${name}`, value: rounded(hsv.latest[index]), spec, edit: one })}
+      ${tag(name)} ${number({ label: `${label}, ${name}`, value: rounded(hsv.latest[index]), spec, edit: one })}
     </div>`;
   });
 }

@@ -2,8 +2,10 @@
 
 import { html, nothing } from 'lit-html';
 import { live } from 'lit-html/directives/live.js';
-import { objection } from '../state/range.js';
+import { evaluated } from '../state/expression.js';
+import { nearest, objection } from '../state/range.js';
 import { icons } from './icons.js';
+import { scrubbed, steps } from './scrubbing.js';
 import { isTyping, release, text } from './typing.js';
 
 const ROOM = 8; // characters of a field
@@ -53,9 +55,9 @@ export function spanOf({ low, high, strict }) {
   return [low + margin, high - margin];
 }
 
-/** A field that takes a number within the range of `spec`, with steps by the arrow keys. */
+/** A field that takes a number within the range of `spec`, also by arithmetic; with steps by arrow keys, wheel and label. */
 export function numberField({ label, value, spec = {}, edit, step = 0.01 }) {
-  const typed = (field) => (field.value.trim() === '' ? NaN : Number(field.value.replace(',', '.')));
+  const typed = (field) => evaluated(field.value, spec.unit);
   const take = (field) => {
     const number = typed(field);
     const wrong = objection(number, spec);
@@ -63,16 +65,24 @@ export function numberField({ label, value, spec = {}, edit, step = 0.01 }) {
     if (wrong) edit.refuse(`${label}: ${wrong}, got ${field.value.trim() || 'nothing'}`);
     else if (number !== value) edit.set(number);
   };
+  const move = (field, by) => {
+    const moved = nearest((isTyping(field) ? typed(field) : value) + by * step, spec);
+    if (moved === undefined) return;
+    edit.move(moved);
+    edit.settle();
+    release(field);
+  };
   const onKey = (event) => {
     const sign = { ArrowUp: 1, ArrowDown: -1 }[event.key];
     if (!sign) return;
     event.preventDefault();
-    const field = event.target;
-    const moved = (isTyping(field) ? typed(field) : value) + sign * step * (event.shiftKey ? 10 : 1);
-    if (objection(moved, spec)) return;
-    edit.move(Number(moved.toPrecision(6)));
-    edit.settle();
-    release(field);
+    move(event.target, sign * steps(event));
+  };
+  const onWheel = (event) => {
+    const field = event.currentTarget;
+    if (field !== field.getRootNode().activeElement) return; // the page scrolls
+    event.preventDefault();
+    move(field, -Math.sign(event.deltaY || event.deltaX) * steps(event));
   };
   return html`<input
     class="number"
@@ -82,7 +92,9 @@ export function numberField({ label, value, spec = {}, edit, step = 0.01 }) {
     spellcheck="false"
     aria-label=${label}
     .value=${text(shown(value))}
+    ${scrubbed({ value, spec, step, edit })}
     @keydown=${onKey}
+    @wheel=${onWheel}
     @change=${({ target }) => take(target)}
   />`;
 }
@@ -206,8 +218,8 @@ export function texture({ label, value, spec, records, edit }) {
   return html`<div class="texture">
     <span class="file" title=${value.texture}>${value.texture.split('/').at(-1)}</span>
     <div class="pairs">
-      <label>scale ${numberField({ label: `${label}, scale`, value: scale, edit: part('scale') })}</label>
-      <label>offset ${numberField({ label: `${label}, offset`, value: offset, edit: part('offset') })}</label>
+      <label>scale ${numberField({ label: `${label}, scale`, value: scale, spec: records.scale, edit: part('scale') })}</label>
+      <label>offset ${numberField({ label: `${label}, offset`, value: offset, spec: records.offset, edit: part('offset') })}</label>
       <label>channel ${choice('channel', channels, channel)}</label>
       <label>encoding ${choice('encoding', records.encoding.options, encoding)}</label>
     </div>

@@ -6,6 +6,7 @@ import { setMetal, setPhase, setValue } from '../state/commands.js';
 import { channelsOf, colour, tint } from './colour.js';
 import { dial, iconButton, menu, number, numberField, texture } from './controls.js';
 import { films } from './films.js';
+import { whole } from './scrubbing.js';
 import { pigments } from './pigments.js';
 import { chosen, dielectrics, metals } from './names.js';
 
@@ -73,9 +74,10 @@ const standards = (schema) => Object.fromEntries(Object.entries(schema).map(([ke
  * are shown by hue.
  */
 export function parameter(services, layer, key) {
-  const spec = services.session.schema[layer.kind][key];
+  const { names, schema, layers } = services.session;
+  const declared = schema[layer.kind][key];
+  const spec = { ...declared, default: declared.default ?? layers[layer.kind].fresh[key] };
   const value = layer.keys[key] ?? spec.default;
-  const { names } = services.session;
   const act = (next) => (key === 'conductor' ? [setMetal, layer.id, next, names] : [setValue, layer.id, key, next]);
   return row(services, { layer, key, label: '', value, spec, act });
 }
@@ -97,15 +99,26 @@ export function row(services, { layer, key, label: part, value, spec, act, owner
     @dragover=${takes.over}
     @drop=${takes.drop}
   >
-    <span class="name">${name} <span class="unit">${spec.kind === 'angle' ? '' : spec.unit}</span></span>
+    <span class="name" ${whole(hasDefault(spec) ? () => takeDefault(context) : null)}
+      >${name} <span class="unit">${spec.kind === 'angle' ? '' : spec.unit}</span></span
+    >
     <span class="extras">${extras}</span>
     <div class="control">${over}${control}</div>
   </div>`;
 }
 
-function explained(key, { doc, low = null, high = null, unit }) {
+/** Whether a double click on the name takes the default: lists of things are not removed by one. */
+const hasDefault = (spec) => Object.hasOwn(PLAIN, spec.kind) && (spec.default ?? null) !== null;
+
+function takeDefault({ value, spec, edit }) {
+  if (JSON.stringify(value) !== JSON.stringify(spec.default)) edit.set(spec.default);
+}
+
+function explained(key, spec) {
+  const { doc, low = null, high = null, unit } = spec;
   const range = high !== null ? `, ${low} to ${high}` : low !== null ? `, from ${low}` : '';
-  return `${key}: ${doc}${range}${unit ? ` (${unit})` : ''}`;
+  const standard = hasDefault(spec) ? `; a double click takes ${[spec.default].flat().join(', ')}` : '';
+  return `${key}: ${doc}${range}${unit ? ` (${unit})` : ''}${standard}`;
 }
 
 // By kind --------------------------------------------------------------------------------------------
@@ -230,7 +243,7 @@ function angle(context) {
     };
     const number = value[key] ?? records.brushing[key].default;
     return html`<label
-      >${key} ${numberField({ label: `${label}, ${key}`, value: number, edit: one })}</label
+      >${key} ${numberField({ label: `${label}, ${key}`, value: number, spec: records.brushing[key], edit: one })}</label
     >`;
   };
   return {

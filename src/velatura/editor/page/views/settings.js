@@ -16,6 +16,8 @@ const MODES = [
 /** What is beside the models to compare with: slow, so that it comes a few samples at a time. */
 const TRUTH = { name: 'truth', title: 'Truth (random walk)' };
 
+const TURN = { unit: 'degrees', default: 0 };
+
 export function line(label, control) {
   return html`<div class="parameter">
     <span class="name">${label}</span>
@@ -45,12 +47,12 @@ function view({ store, session, edits, picture, choose, takeEnvironment }) {
     const file = await choose('.hdr,.exr');
     if (file) takeEnvironment(file);
   };
-  const exposure = { label: 'Exposure, in stops', spec: { low: -20, high: 20 }, span: [-4, 4] };
+  const exposure = { label: 'Exposure, in stops', spec: { low: -20, high: 20, default: 0 }, span: [-4, 4] };
   const objects = session.objects.map((name) => [name, capital(name)]);
   return html`
     ${choice('Object', view.object, withOwn(objects, view.object), chooseObject)}
     ${choice('Light', view.environment, withOwn(known, view.environment), change('environment').set)}
-    ${line('Light turned', dial({ label: 'Rotation of the light', value: view.rotation, edit: change('rotation') }))}
+    ${line('Light turned', dial({ label: 'Rotation of the light', value: view.rotation, spec: TURN, edit: change('rotation') }))}
     ${line('Exposure', number({ ...exposure, value: view.exposure, edit: change('exposure') }))}
     ${line('Lobes', lobes({ store, session, picture }))}
     <div class="actions">
