@@ -5,7 +5,7 @@ import { test } from 'node:test';
 
 import * as commands from '../../src/velatura/editor/page/state/commands.js';
 import { besideOf, keptOf, slotBeside } from '../../src/velatura/editor/page/state/compared.js';
-import { documentOf, layerName, pattern, variantOf } from '../../src/velatura/editor/page/state/material.js';
+import { documentOf, isOpaque, layerName, objectionToEnabling, pattern, variantOf } from '../../src/velatura/editor/page/state/material.js';
 import { tileCorner, tileSize } from '../../src/velatura/editor/page/render/tiles.js';
 import { lookOf } from '../../src/velatura/editor/page/state/snapshots.js';
 import { createStore } from '../../src/velatura/editor/page/state/store.js';
@@ -70,6 +70,48 @@ test('a layer goes where it is put, with an index that shows', () => {
   assert.deepEqual(documentOf(coated).layers[0].interface.eta, 1.33);
 });
 
+test('no order that hands make is refused, and what had to wait is on again', () => {
+  const begun = commands.addLayer(commands.addLayer(opened(), 'interface', FRESH.interface, 0), 'diffuse', FRESH.diffuse);
+  const ids = begun.layers.map(({ id }) => id);
+  const stands = ({ layers, thin }) => {
+    const on = layers.filter(({ enabled }) => enabled), opaque = on.findIndex(isOpaque);
+    assert.ok(on.length && on.at(-1).kind !== 'medium' && (opaque < 0 || (opaque === on.length - 1 && !thin)));
+  };
+  const acts = [
+    (state, id, at) => commands.moveLayer(state, id, at),
+    (state, id, at) => commands.enableLayer(state, id, at % 2 === 0),
+    (state, id) => commands.duplicateLayer(state, id),
+    (state, id) => commands.setVariant(state, id, 'metal', NAMES, FRESH),
+    (state, id) => commands.setVariant(state, id, 'dielectric', NAMES, FRESH),
+  ];
+  for (const act of acts) for (const next of acts) for (const id of ids) for (const other of ids) for (let at = 0; at < ids.length; at++) {
+    if (begun.layers.find((layer) => layer.id === id).kind === 'medium' && act !== acts[0]) continue; // has no such kinds
+    const once = act(begun, id, at);
+    stands(once);
+    const layer = once.layers.find((each) => each.id === other);
+    if (layer.kind === 'medium' && next !== acts[0]) continue;
+    if (next === acts[1] && (objectionToEnabling(once.layers, once.layers.indexOf(layer)) || alone(once, layer))) continue;
+    stands(next(once, other, at));
+  }
+  const metal = begun.layers.findIndex(isOpaque), { id } = begun.layers[metal];
+  const on = (state) => state.layers.map(({ enabled }) => enabled);
+  const up = commands.moveLayer(commands.enableLayer(begun, id, true), id, 0);
+  assert.deepEqual(on(up), [true, false, false, false, false]);
+  assert.deepEqual(on(commands.enableLayer(up, id, false)), [false, true, true, true, true]);
+});
+
+/** Whether a layer is the last that a material stands on, which the page does not turn off. */
+const alone = ({ layers }, layer) => layers.filter(({ enabled, kind }) => enabled && kind !== 'medium').every((each) => each === layer);
+
+test('a base that becomes clear ends in the exterior', () => {
+  const varnish = { layers: [{ interface: { eta: 1.5 } }, { diffuse: { albedo: 0.5 } }] };
+  const state = commands.initial(varnish, SESSION);
+  const pane = commands.setVariant(state, state.layers[1].id, 'dielectric', NAMES, FRESH);
+  assert.equal(pane.layers[1].keys.eta, 1);
+  const block = commands.setVariant(commands.removeLayer(state, 1), 2, 'dielectric', NAMES, FRESH);
+  assert.equal(block.layers[0].keys.eta, 1.5, 'what is alone shows');
+});
+
 test('what cannot stand is turned off', () => {
   const painted = commands.addLayer(opened(), 'diffuse', FRESH.diffuse);
   const bare = commands.removeLayer(painted, painted.layers.at(-1).id);
@@ -105,7 +147,7 @@ test('a page of refractiveindex.info is a metal', () => {
   assert.deepEqual(base(commands.setMetal(measured, 3, 'Al', NAMES)), { conductor: 'Al', ...surface });
   const numbers = commands.setVariant(measured, 3, 'custom', NAMES, FRESH);
   assert.deepEqual(base(numbers), { eta: [2.74, 2.54, 2.27], k: [3.81, 3.43, 3.04], ...surface });
-  assert.equal(base(commands.setVariant(measured, 3, 'dielectric', NAMES, FRESH)).eta, 1.5);
+  assert.equal(base(commands.setVariant(measured, 3, 'dielectric', NAMES, FRESH)).eta, 1, 'a pane ends in the exterior');
 });
 
 test('layers have identities of their own', () => {

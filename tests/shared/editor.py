@@ -83,7 +83,7 @@ def _environment() -> dict[str, str]:
 
 # Parts of the page that are closed until they are wanted, open unless the visit has closed them
 EVERYTHING_OPEN = """localStorage['velatura.layout'] ??=
-  JSON.stringify({ form: 1, value: { look: true, view: true, model: true } })"""
+  JSON.stringify({ form: 1, value: { look: true, view: true, model: true, expert: true } })"""
 
 
 # Previews alone are drawn, from the first one on: a page that traces paths compiles their programs

@@ -19,6 +19,7 @@ import { chooseFile, offer } from './views/browser.js';
 import { createChoice } from './views/choice.js';
 import { mountInspector } from './views/inspector.js';
 import { createLayers } from './views/layers.js';
+import { createLayout } from './views/layout.js';
 import { createPage } from './views/page.js';
 import { createModel, createView } from './views/settings.js';
 import { createStrip } from './views/strip.js';
@@ -58,6 +59,7 @@ export function mount(root, { call, lacks = nothingLacks, live, session, storage
     onError: (error) => messages.complain('picture', error.message),
   });
   const edits = createEdits({ store, viewport, messages });
+  const arrangement = createLayout(storage, update);
   const lobes = createSignal(window);
   const focus = (selector) => element.querySelector(selector)?.focus();
   const choose = (accept) => chooseFile(element, accept);
@@ -111,10 +113,10 @@ export function mount(root, { call, lacks = nothingLacks, live, session, storage
     },
   });
   page = createPage({
-    ...{ store, session, storage, edits, messages, picture, canvas, focus, update, lacks, toolbar: toolbar.view },
+    ...{ store, session, ...arrangement, edits, messages, picture, canvas, focus, update, lacks, toolbar: toolbar.view },
     choice: choice.view,
     layers: createLayers({
-      ...{ store, session, lacks, edits, messages, choose, upload: files.upload, focus, update, mix: toolbar.mix },
+      ...{ store, session, ...arrangement, lacks, edits, messages, choose, upload: files.upload, focus, update, mix: toolbar.mix },
       strips: createStrips({ call, lacks, update }),
     }),
     strip: createStrip({ store, snapshots, focus, update }),

@@ -102,8 +102,8 @@ function inserted(state, layer, index) {
 export const addLayer = titled('add a layer', (state, kind, keys = {}, at = null) => {
   const layer = { id: freshId(state), kind, enabled: true, keys };
   if (isBase(layer)) {
-    const covered = state.layers.map((other) => (isOpaque(other) ? { ...other, enabled: false } : other));
-    return inserted({ ...state, layers: covered }, layer, state.layers.length);
+    const covered = state.layers.map((other) => (isOpaque(other) ? { ...other, enabled: false, waits: false } : other));
+    return standing(inserted({ ...state, layers: covered }, layer, state.layers.length));
   }
   const index = at ?? (kind === 'interface' ? 0 : gap(state));
   const fresh = typeof keys.eta === 'number' ? { ...layer, keys: stepped(state, keys, index) } : layer;
@@ -115,24 +115,30 @@ const STEP = 0.05; // of the index, which is seen
 
 /** The keys of an interface whose index would be that of a neighbour: with another one, at the bottom the exterior's. */
 function stepped({ layers, exterior }, keys, at) {
-  const isInterface = ({ kind, enabled }) => enabled && kind === 'interface';
+  const isInterface = (layer) => isWanted(layer) && layer.kind === 'interface';
   const next = [layers.slice(0, at).findLast(isInterface), layers.slice(at).find(isInterface)];
   const [above, below] = next.map((layer) => layer?.keys.eta);
   const differs = (eta) => [above, below].every((other) => !(Math.abs(eta - other) < STEP));
-  const bottom = above !== undefined && layers.slice(at).every((layer) => !layer.enabled);
+  const bottom = above !== undefined && !layers.slice(at).some(isWanted);
   const found = [...(bottom ? [exterior] : []), keys.eta, ...STEPS].find(differs);
   return { ...keys, eta: found };
 }
 
-/** Turns off what cannot stand: what lies below an opaque layer, and media above nothing. */
+/** Whether a layer is on, or is once it can stand. */
+const isWanted = ({ enabled, waits }) => enabled || waits;
+
+/**
+ * Turns off what cannot stand: what lies below an opaque layer, and media above nothing. These wait, and are on again
+ * once they can stand. What is opaque is no pane.
+ */
 function standing(state) {
-  const covered = state.layers.findIndex((layer) => layer.enabled && isOpaque(layer));
-  const lowest = state.layers.findLastIndex(({ enabled, kind }) => enabled && kind !== 'medium');
-  const last = covered >= 0 ? covered : lowest;
-  return {
-    ...state,
-    layers: state.layers.map((layer, index) => (index > last ? { ...layer, enabled: false } : layer)),
+  const covered = state.layers.findIndex((layer) => isWanted(layer) && isOpaque(layer));
+  const last = covered >= 0 ? covered : state.layers.findLastIndex((layer) => isWanted(layer) && layer.kind !== 'medium');
+  const put = ({ waits, ...layer }, index) => {
+    if (!layer.enabled && !waits) return layer;
+    return index <= last ? { ...layer, enabled: true } : { ...layer, enabled: false, waits: true };
   };
+  return { ...state, thin: state.thin && covered < 0, layers: state.layers.map(put) };
 }
 
 /** The lowest place between two layers that can take a medium, or else the top. */
@@ -153,16 +159,16 @@ export const moveLayer = titled('move a layer', (state, id, index) => {
   const place = Math.max(0, Math.min(state.layers.length - 1, index));
   if (from === place) return state;
   const rest = state.layers.filter((layer) => layer.id !== id);
-  return inserted({ ...state, layers: rest }, state.layers[from], place);
+  return standing(inserted({ ...state, layers: rest }, state.layers[from], place));
 });
 
 export const duplicateLayer = titled('duplicate a layer', (state, id) => {
   const index = state.layers.findIndex((layer) => layer.id === id);
-  return inserted(state, { ...state.layers[index], id: freshId(state) }, index);
+  return standing(inserted(state, { ...state.layers[index], id: freshId(state) }, index));
 });
 
 export const enableLayer = titled('turn a layer on or off', (state, id, on) =>
-  changed(state, id, () => ({ enabled: on })),
+  standing(changed(state, id, () => ({ enabled: on, waits: false }))),
 );
 
 export const setValue = titled('change a value', (state, id, key, value) =>
@@ -230,7 +236,14 @@ export const setPigment = titled('change a pigment', (state, id, n, changes) =>
  * another kind takes that it has not is `fresh`, by the names of layers.
  */
 export const setVariant = titled('change the kind of a layer', (state, id, variant, names, fresh) =>
-  standing(changed(state, id, ({ kind, keys }) => become(variant, kind, keys, names, fresh))),
+  standing(
+    changed(state, id, (layer) => {
+      const next = become(variant, layer.kind, layer.keys, names, fresh);
+      const isNew = variant === 'dielectric' && !['dielectric', 'custom'].includes(variantOf(layer)); // an index of no number before
+      const others = { ...state, layers: state.layers.filter((other) => other !== layer) };
+      return isNew ? { ...next, keys: stepped(others, next.keys, state.layers.indexOf(layer)) } : next;
+    }),
+  ),
 );
 
 function become(variant, kind, keys, names, fresh) {

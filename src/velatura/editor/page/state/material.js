@@ -113,6 +113,14 @@ export const pageOf = (value) => value?.refractiveindex;
 export const isOpaque = (layer) =>
   isBase(layer) || (layer.kind === 'interface' && variantOf(layer) !== 'dielectric');
 
+/** Why a layer that is off cannot be turned on, '' where it can. */
+export function objectionToEnabling(layers, index) {
+  const on = (some) => layers.some((layer, at) => layer.enabled && some(layer, at));
+  if (on((layer, at) => at < index && isOpaque(layer))) return 'Nothing shows below an opaque layer';
+  const bare = layers[index].kind === 'medium' && !on(({ kind }, at) => at > index && kind !== 'medium');
+  return bare ? 'An interface or a base must lie below a medium' : '';
+}
+
 /** How a message or a button calls a layer; `declared` are the layers of the session. */
 export function layerName(layer, declared) {
   const { kind, keys } = layer;

@@ -132,21 +132,23 @@ export function menu({ label, value, options, choose }) {
   </select>`;
 }
 
-export function flag({ label, value, choose, title = '' }) {
-  return html`<label class="flag" title=${title}>
-    <input type="checkbox" .checked=${live(value)} @change=${({ target }) => choose(target.checked)} />
+/** A checkbox; `lacks` says why it cannot be changed, where it cannot. */
+export function flag({ label, value, choose, title = '', lacks = '' }) {
+  return html`<label class="flag" title=${lacks || title}>
+    <input type="checkbox" ?disabled=${lacks} .checked=${live(value)} @change=${({ target }) => choose(target.checked)} />
     ${label}
   </label>`;
 }
 
-/** A button that is a drawing; `pressed` makes it a switch. */
-export function iconButton({ label, icon, act, pressed = null, disabled = false, name = '', title = label, tabindex = 0 }) {
+/** A button that is a drawing; `pressed` makes it a switch, and `expanded` says whether what it folds is open. */
+export function iconButton({ label, icon, act, pressed = null, expanded = null, disabled = false, name = '', title = label, tabindex = 0 }) {
   return html`<button
     type="button"
     class="small ${name}"
     title=${title}
     aria-label=${label}
     aria-pressed=${pressed ?? nothing}
+    aria-expanded=${expanded ?? nothing}
     tabindex=${tabindex || nothing}
     ?disabled=${disabled}
     @click=${act}

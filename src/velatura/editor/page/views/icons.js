@@ -13,6 +13,8 @@ export const icons = {
   duplicate: path('M5.5 5.5h8v8h-8zM10.5 5.5v-3h-8v8h3'),
   remove: path('M4 4l8 8M12 4l-8 8'),
   beside: path('M2.5 3h11v10h-11zM8 3v10'),
+  fold: path('M3.5 6l4.5 4.5L12.5 6'),
+  unfold: path('M6 3.5L10.5 8 6 12.5'),
   plus: path('M8 3v10M3 8h10'),
   locked: path('M4 7.5h8v6H4zM5.5 7.5v-2a2.5 2.5 0 0 1 5 0v2'),
   unlocked: path('M4 7.5h8v6H4zM5.5 7.5v-3a2.5 2.5 0 0 1 4.7-1.2'),

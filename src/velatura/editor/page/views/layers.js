@@ -16,11 +16,12 @@ import {
   setThin,
   setVariant,
 } from '../state/commands.js';
-import { enabled, isBase, layerName, variantOf } from '../state/material.js';
-import { capital, flag, iconButton, menu, numberField } from './controls.js';
+import { enabled, isBase, isOpaque, layerName, objectionToEnabling, pageOf, variantOf } from '../state/material.js';
+import { createCards } from './cards.js';
+import { capital, flag, iconButton, menu, numberField, shown } from './controls.js';
 import { icons } from './icons.js';
 import { grip } from './moving.js';
-import { parameter, parametersOf, tintOf } from './parameter.js';
+import { hasTint, parameter, parametersOf, tintOf } from './parameter.js';
 import { parts } from './parts.js';
 import { text } from './typing.js';
 
@@ -36,14 +37,14 @@ const BETWEEN = ['interface', 'medium']; // kinds that may lie above others
 /** A view of the layers of the state. */
 export function createLayers(services) {
   // The places where a card that is dragged would go, and where a new one is chosen
-  const panel = { ...services, dropAt: null, openAt: null, spaces: new Map() };
+  const panel = { ...services, cards: createCards(services), dropAt: null, openAt: null, spaces: new Map() };
   return () => layers(panel);
 }
 
 function layers(panel) {
   const state = panel.store.get();
   return html`
-    ${top(panel, state)} ${notCarried(placeOf(state).imported)} ${parts(panel)}
+    ${top(panel, state)} ${notCarried(placeOf(state).imported)} ${parts(panel)} ${panel.cards.tools()}
     <ol class="layers">
       ${repeat(
         state.layers,
@@ -102,7 +103,8 @@ function between(panel, index) {
   </li>`;
 }
 
-function top({ store, session, edits }, { name, exterior, thin }) {
+function top({ store, session, edits }, state) {
+  const { name, exterior, thin } = state, lacks = isOpaque(enabled(state).at(-1)) ? 'Only of what ends in a dielectric' : '';
   const edit = edits.of('exterior', (next) => [setExterior, next], 'material');
   const { material } = session.schema;
   return html`<div class="top">
@@ -118,7 +120,7 @@ function top({ store, session, edits }, { name, exterior, thin }) {
     <label title=${material.exterior.doc}>
       Exterior ${numberField({ label: 'Exterior index', value: exterior, spec: material.exterior, edit })}
     </label>
-    ${flag({ label: 'Thin pane', value: thin, title: material.thin.doc, choose: (on) => store.run(setThin, on) })}
+    ${flag({ label: 'Thin pane', value: thin, title: material.thin.doc, lacks, choose: (on) => store.run(setThin, on) })}
   </div>`;
 }
 
@@ -143,21 +145,23 @@ function card(panel, layer, index) {
   const number = numberOf(store.get(), layer.id);
   const standing = enabled(store.get()).filter(({ kind }) => kind !== 'medium');
   const only = standing.length === 1 && standing[0] === layer; // without which there is no material
+  const wrong = layer.enabled ? '' : objectionToEnabling(store.get().layers, index);
+  const tinted = hasTint(panel, layer), { cards } = panel;
   return html`<li
     class="layer ${layer.kind} ${layer.enabled ? '' : 'off'} ${panel.dropAt === index ? 'drop' : ''}"
     data-layer=${layer.id}
     aria-label=${layer.enabled ? `Layer ${number}: ${name}` : `${name}, off`}
   >
     <div class="head">
-      ${grip({ name, place: index, items: '.layer', ...moving(panel, layer) })}
+      ${layer.enabled ? cards.fold(layer, name) : nothing} ${grip({ name, place: index, items: '.layer', ...moving(panel, layer) })}
       <b class="place" title="Its number in plots and messages">${layer.enabled ? number : '–'}</b>
       ${kindOf(panel, layer)}
       <span class="buttons">
         <input
           type="checkbox"
-          title="On or off"
+          title=${wrong || 'On or off'}
           aria-label=${`${name} is on`}
-          ?disabled=${only}
+          ?disabled=${only || wrong}
           .checked=${live(layer.enabled)}
           @change=${({ target }) => store.run(enableLayer, layer.id, target.checked)}
         />
@@ -179,16 +183,31 @@ function card(panel, layer, index) {
       </span>
     </div>
     ${problem ? html`<p class="problem">${problem}</p>` : nothing}
-    <div class="parameters" ?hidden=${!layer.enabled}>
-      ${layer.kind === 'medium' ? tintOf(panel, layer) : nothing}
+    <div class="parameters" ?hidden=${!layer.enabled || cards.isFolded(layer)}>
+      ${tinted && cards.isSought('Colour, tint') ? tintOf(panel, layer) : nothing}
       ${repeat(
-        parametersOf(layer, session.schema),
+        cards.keysOf(layer, parametersOf(layer, session.schema), tinted ? ['sigma_a'] : []),
         (key) => key,
         (key) => parameter(panel, layer, key),
       )}
+      ${below(store.get(), layer)}
     </div>
   </li>`;
 }
+
+/** What lies below an interface of a pane, in words. */
+function below(state, { id, keys }) {
+  const all = enabled(state), last = all.at(-1);
+  if (isOpaque(last) || all.find((layer) => layer.id === id)?.kind !== 'interface') return nothing;
+  const { eta } = keys, isNumber = typeof eta === 'number';
+  const name = isNumber ? substance(eta) : typeof eta === 'string' ? eta : (pageOf(eta) ?? 'as its index says');
+  const endless = last.id === id && isNumber && eta !== state.exterior ? ', without an end' : '';
+  return html`<p class="below">below: ${name}${isNumber ? ` ${shown(eta)}` : nothing}${endless}</p>`;
+}
+
+const LIQUID = 1.4; // index, up to which clear things are liquids
+
+const substance = (eta) => (eta === 1 ? 'air' : eta < LIQUID ? 'liquid' : 'glass');
 
 function kindOf({ store, session }, layer) {
   if (layer.kind === 'medium')

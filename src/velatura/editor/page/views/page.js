@@ -17,15 +17,8 @@ import { titleOf } from './strip.js';
  * @param {object} parts views `toolbar`, `choice`, `layers`, `strip`, `view` and `model` of what is in it, its `canvas`, and what it works on;
  *   `onFace()` is called after the panel has turned
  */
-export function createPage({ store, session, storage, edits, messages, picture, canvas, focus, update, lacks, onFace, ...parts }) {
+export function createPage({ store, session, layout, arrange, edits, messages, picture, canvas, focus, update, lacks, onFace, ...parts }) {
   let face = 'layers'; // of the panel
-  const layout = { ...LAYOUT, ...storage.layout() };
-
-  function arrange(changes) {
-    Object.assign(layout, changes);
-    storage.keepLayout(layout);
-    update();
-  }
 
   function show(name) {
     face = name;
@@ -119,8 +112,6 @@ export function createPage({ store, session, storage, edits, messages, picture, 
   return { view, show };
 }
 
-/** What is open, and the sizes in pixels that hands have given. */
-const LAYOUT = { history: true, look: false, view: false, model: false, lookHeight: null, panelWidth: null };
 const [LOOK, PANEL] = [384, 352]; // where no hand has been
 const SMALLEST = 120;
 const NARROWEST = 280;

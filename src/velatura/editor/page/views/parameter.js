@@ -47,16 +47,27 @@ export function parametersOf(layer, schema) {
   return [...INDICES[variantOf(layer)], ...all.filter((key) => !hidden.includes(key))];
 }
 
+/** Whether a parameter is called by a word in small letters, or one within it is. */
+export function isCalled(key, { kind }, schema, word) {
+  const within = { films: schema.film, pigments: schema.pigment }[kind] ?? {};
+  return [key, ...Object.keys(within)].flatMap((each) => [each, NAMES[each] ?? '']).some((name) => name.toLowerCase().includes(word));
+}
+
 /** Parameters of a medium that follow from others. */
 function unseen({ phase, pigments }) {
   return [...(phase === undefined ? [] : ['g']), ...(pigments === undefined ? [] : ['sigma_a', 'sigma_s'])];
 }
 
-/** The colour of a medium, which is that of its absorption; nothing where an image, a table or pigments have it. */
-export function tintOf({ store, session, edits }, layer) {
+/** Whether a medium has a colour, which is that of its absorption: not where an image, a table or pigments have that. */
+export function hasTint({ session }, layer) {
+  if (layer.kind !== 'medium') return false;
   const { sigma_a: sigma, depth, pigments } = { ...standards(session.schema.medium), ...layer.keys };
-  if (pigments.length) return nothing;
-  if (typeof depth !== 'number' || depth <= 0 || typeof sigma !== 'number' && !Array.isArray(sigma)) return nothing;
+  return !pigments.length && typeof depth === 'number' && depth > 0 && (typeof sigma === 'number' || Array.isArray(sigma));
+}
+
+/** The colour of a medium that has one. */
+export function tintOf({ store, session, edits }, layer) {
+  const { sigma_a: sigma, depth } = { ...standards(session.schema.medium), ...layer.keys };
   const twice = isOpaque(enabled(store.get()).at(-1));
   const label = `Colour ${twice ? 'twice' : 'once'} through`;
   const act = (next) => [setValue, layer.id, 'sigma_a', next];
