@@ -129,3 +129,10 @@ def test_what_was_asked_for_last_is_kept_up_to_a_size() -> None:
     for key in (1, 2, 3, 1, 4, 1, 2):
         assert ask(kept, key)[0] == key
     assert made == [1, 2, 3, 4, 2]
+
+
+def test_an_array_that_a_result_has_twice_counts_once() -> None:
+    kept, array = Kept(2400), np.zeros(100)
+    for key in (1, 2, 3):
+        kept.once(key, lambda: (array, [array, array]))
+    kept.once(1, lambda: pytest.fail("the first result is not kept"))

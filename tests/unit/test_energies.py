@@ -9,11 +9,14 @@ import tmm
 import velatura as vt
 from velatura import tables
 from velatura.model.guards import ALPHA_MIN
+from velatura.model.rough_interface import KEPT
+from velatura.model.solved.energies import adding
 from velatura.model.solved.energies.adding import Leaving, indices, layers, parts
 from velatura.model.solved.energies.energies import Energies, energies
 from velatura.model.solved.energies.interfaces import Setting
 from velatura.model.solved.energies.modes import RATIOS, Even, Relative
 from velatura.model.solved.energies.nodes import CLOSE, Nodes
+from velatura.model.solved.energies.operators import Layer
 from velatura.optics import fresnel, ggx
 from velatura.stack import Diffuse, Interface, Material, Medium, Stack
 
@@ -356,3 +359,25 @@ def test_energies_agree_with_walks(name: str, often: bool) -> None:
     if walked.transmitted and walked.standard_error.transmitted:
         through, noise = walked.transmitted.energy, walked.standard_error.transmitted.energy
         assert np.all(np.abs(found.passed - through) < FALSE_ALARM_SIGMAS * noise + MODEL_ERROR * through)
+
+
+def test_both_sides_of_a_pane_share_what_its_layers_do(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Below it is another medium than above, whose index is the unit of momentum there."""
+    stack = Stack([Interface(eta=1.5, alpha=[0.1, 0.2], rotation=20), Medium(depth=1, sigma_s=0.5, g=0.3),
+                   Interface(eta=1.33, alpha=[0.2, 0.1])])  # fmt: skip
+    below, made, make = Material.of(stack).reversed(), [], adding._made
+
+    def counted(part: adding.Part, setting: Setting) -> tuple[Layer, Layer]:
+        made.append(len(setting.p))
+        return make(part, setting)
+
+    def seen_from_below() -> np.ndarray:
+        return reflected(energies(below, COSINES, 0 * COSINES, tables.load(), lambda g: 0.0, np.zeros(0)))
+
+    KEPT.clear()
+    alone = seen_from_below()
+    KEPT.clear()
+    solved(stack)
+    monkeypatch.setattr(adding, "_made", counted)
+    assert seen_from_below() == pytest.approx(alone, abs=1e-12)
+    assert made and all(made)  # beams alone meet an interface anew

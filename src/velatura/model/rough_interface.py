@@ -39,6 +39,11 @@ PATHS = 2048  # from each
 KEPT = Kept(128 << 20)  # layers, and what they are made of
 
 
+def in_units(values: Any, unit: float) -> bytes:
+    """Indices or momenta as multiples of a unit: equal where they are alike."""
+    return np.round(np.asarray(values) / unit, DIGITS).tobytes()
+
+
 def colours(value: Any) -> Array:
     """A colour of shape (3,), or (1,) where all are alike."""
     flat = np.asarray(value, float).reshape(-1)
@@ -75,7 +80,7 @@ class Facets:
         def of(value: Any) -> Hashable:
             if isinstance(value, Coated):
                 return value.key
-            return np.round(value / unit, DIGITS).tobytes() if isinstance(value, np.ndarray) else value
+            return in_units(value, unit) if isinstance(value, np.ndarray) else value
 
         return tuple(map(of, vars(self).values()))
 

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from collections import OrderedDict
-from collections.abc import Callable, Hashable
+from collections.abc import Callable, Hashable, Iterator
 from dataclasses import is_dataclass
 from threading import Lock
 from typing import Any, TypeVar
 
 import numpy as np
+from numpy.typing import NDArray
 
 T = TypeVar("T")
 
@@ -47,9 +48,15 @@ class Kept:
 
 
 def _size(value: Any) -> int:
-    """Bytes of all arrays in a tuple, a list or a record."""
+    """Bytes of all arrays in a tuple, a list or a record, of those that are there more than once counted once."""
+    return sum({id(array): array.nbytes for array in _arrays(value)}.values())
+
+
+def _arrays(value: Any) -> Iterator[NDArray[Any]]:
     if isinstance(value, np.ndarray):
-        return value.nbytes
-    if isinstance(value, tuple | list):
-        return sum(map(_size, value))
-    return sum(map(_size, vars(value).values())) if is_dataclass(value) else 0
+        yield value
+    elif isinstance(value, tuple | list):
+        for each in value:
+            yield from _arrays(each)
+    elif is_dataclass(value):
+        yield from _arrays([*vars(value).values()])

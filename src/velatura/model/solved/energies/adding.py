@@ -14,19 +14,17 @@ import operator
 from collections.abc import Hashable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any, NamedTuple, TypeVar
+from typing import NamedTuple, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
 from velatura import ops
 from velatura.films.of_material import films_of
-from velatura.films.tables import Coated
-from velatura.model.rough_interface import KEPT, Facets, colours
+from velatura.model.rough_interface import KEPT, Facets, colours, in_units
 from velatura.model.solved.energies.interfaces import Setting, interface, lit
 from velatura.model.solved.energies.media import Slab, Straight, medium
 from velatura.model.solved.energies.operators import Functional, Layer, Operator
-from velatura.optics.phase import PhaseFunction
 from velatura.stack import InterfaceValues, Material, SlabValues
 from velatura.stack.chain import chain
 
@@ -40,6 +38,10 @@ class Lambert:
 
     n: float
     albedo: Array
+
+    def key(self, unit: float) -> Hashable:
+        """All values, with the index as a multiple of a unit."""
+        return in_units(self.n, unit), self.albedo.tobytes()
 
 
 Part = Facets | Slab | Lambert
@@ -137,11 +139,6 @@ def layer(part: Part, setting: Setting) -> tuple[Layer, Layer]:
         back = once.reversed()
         return back, back if often is once else often.reversed()
 
-    def key(value: Any) -> Hashable:
-        if isinstance(value, Coated | PhaseFunction):
-            return value.key
-        return None if value is None else np.asarray(value).tobytes()
-
     def made() -> tuple[Layer, Layer]:
         basis = setting.basis
         if basis.symmetric is basis or (isinstance(part, Facets) and part.ratio != 1):
@@ -150,7 +147,7 @@ def layer(part: Part, setting: Setting) -> tuple[Layer, Layer]:
         spread = once.map(lambda x: basis.of_symmetric(x, setting.phi))
         return spread, spread if often is once else often.map(lambda x: basis.of_symmetric(x, setting.phi))
 
-    return KEPT.once((type(part), *map(key, vars(part).values()), setting.key), made)
+    return KEPT.once((type(part), part.key(setting.unit), setting.key), made)
 
 
 def _made(part: Part, setting: Setting) -> tuple[Layer, Layer]:

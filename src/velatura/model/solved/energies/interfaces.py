@@ -19,7 +19,15 @@ from numpy.typing import NDArray
 from velatura import ops, tables
 from velatura.model import fitted
 from velatura.model.guards import ALPHA_MIN, COS_AT_FACETS_MIN
-from velatura.model.rough_interface import DIGITS, KEPT, Facets, FirstEvents, FirstShares, mean_alpha, shares_of_films
+from velatura.model.rough_interface import (
+    KEPT,
+    Facets,
+    FirstEvents,
+    FirstShares,
+    in_units,
+    mean_alpha,
+    shares_of_films,
+)
 from velatura.model.solved.energies.modes import Basis
 from velatura.model.solved.energies.operators import Layer, Operator
 from velatura.model.solved.guards import TINY, TRACE
@@ -52,9 +60,16 @@ class Setting:
         return [False] if self.often is None else [False, True]
 
     @property
+    def unit(self) -> float:
+        """The greatest momentum of light: what layers do depends on multiples of it alone."""
+        return self.basis.nodes.ends[-1]
+
+    @property
     def key(self) -> Hashable:
-        """All that it is."""
-        return self.basis, self.samples, self.often, self.events, self.p.tobytes(), self.phi.tobytes()
+        """All that it is, but for the unit."""
+        basis, ends, p = self.basis, in_units(self.basis.nodes.ends, self.unit), in_units(self.p, self.unit)
+        light = type(basis), basis.deposits, basis.azimuths.tobytes(), ends, p, self.phi.tobytes()
+        return *light, self.samples, self.often, self.events
 
     def kept(self, key: Hashable, make: Callable[[], T]) -> T:
         """A result for light in this basis, regardless of the ends of its nodes, made once for all of one key."""
@@ -155,12 +170,11 @@ class _Met:
     def of_each(cls, facets: Facets, sources: Sequence[tuple[Array, Array]], setting: Setting) -> list[_Met]:
         """First events of groups of sources (p, psi), once for interfaces that are alike but for their rotation and the
         unit of momentum; all that are not known at once where none depends on the axes of the facets."""
-        facets, nodes = replace(facets, rotation=0.0), setting.basis.nodes
-        unit = nodes.ends[-1]
-        own = facets.key(unit), np.round(np.array(nodes.ends) / unit, DIGITS).tobytes()
+        facets, unit = replace(facets, rotation=0.0), setting.unit
+        own = facets.key(unit), in_units(setting.basis.nodes.ends, unit)
 
         def kept(p: Array, psi: Array, make: Callable[[], _Met]) -> _Met:
-            return setting.kept((*own, np.round(p / unit, DIGITS).tobytes(), psi.tobytes()), make)
+            return setting.kept((*own, in_units(p, unit), psi.tobytes()), make)
 
         if facets.alpha_u != facets.alpha_v:
             return [kept(p, psi, partial(cls._of, facets, p, psi, setting)) for p, psi in sources]
@@ -223,7 +237,7 @@ def _blocked(sides: Sequence[Facets], setting: Setting) -> list[_Blocked]:
     if setting.often is None:
         return []
     key = setting.dark.key
-    return [KEPT.once((_Blocked, side.key(), key), partial(_Blocked.of, side, setting)) for side in sides]
+    return [KEPT.once((_Blocked, side.key(setting.unit), key), partial(_Blocked.of, side, setting)) for side in sides]
 
 
 def _sources(facets: Facets, setting: Setting) -> list[tuple[Array, Array]]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Hashable, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from math import factorial, pi, sqrt
@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from velatura import ops
 from velatura.media.of_material import phase_of
-from velatura.model.rough_interface import Light, colours
+from velatura.model.rough_interface import Light, colours, in_units
 from velatura.model.solved.energies.interfaces import Setting, scaled
 from velatura.model.solved.energies.modes import Basis
 from velatura.model.solved.energies.operators import Layer, Operator
@@ -68,6 +68,10 @@ class Slab:
             phase = HenyeyGreenstein(float(np.mean(phase.g)))
         return cls(n, tau_a, tau_s, phase, None if straight is None else straight(phase))
 
+    def key(self, unit: float) -> Hashable:
+        """All values, with the index as a multiple of a unit."""
+        return in_units(self.n, unit), self.tau_a.tobytes(), self.tau_s.tobytes(), self.phase.key, self.straight
+
 
 def medium(slab: Slab, setting: Setting) -> Layer:
     """A medium as a layer; it looks alike from both sides."""
@@ -116,7 +120,8 @@ def _kept(slab: Slab, depth: Array, p: Array) -> Array:
 def _scattered(slab: Slab, p: Array, psi: Array, setting: Setting) -> tuple[Array, ...]:
     """Light that is scattered up, and down, of light of one unit that travels down, (1, modes, N, S); kept for other
     media."""
-    key = _scattered, slab.n, slab.phase.key, setting.events, p.tobytes(), psi.tobytes(), setting.basis.nodes.ends
+    momenta = (in_units(each, setting.unit) for each in (slab.n, p, setting.basis.nodes.ends))
+    key = _scattered, slab.phase.key, setting.events, *momenta, psi.tobytes()
     lattice = _lattice(slab.phase, setting.events)
     return tuple(
         setting.kept(key, lambda: setting.basis.deposited(_events, p, psi, lattice, Varying([slab.n]), _events)[0])
