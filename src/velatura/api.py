@@ -21,8 +21,12 @@ if TYPE_CHECKING:
 
 __all__ = ["bsdf", "check", "lobes", "register", "render"]
 
-#: What `bsdf` makes that is no statistical model: plugins by the name that it goes by among the models.
-PLUGINS = {"reference": "layered_reference", "weidlich_wilkie": "weidlich_wilkie"}
+#: What `bsdf` makes that is no statistical model: plugins, by the name that they go by among the models.
+PLUGINS = {
+    "reference": {"type": "layered_reference"},
+    "exact": {"type": "layered", "form": "exact"},
+    "weidlich_wilkie": {"type": "weidlich_wilkie"},
+}
 
 TURN = 37.0  # degrees, by which `check` turns brushed materials
 
@@ -81,8 +85,9 @@ def bsdf(stack: MaterialLike, model: str | Model = DEFAULT, **switches: Any) -> 
 
     Args:
         stack: a material (a stack, a mixture, a file, or a preset's name).
-        model: a named model, its choices changed by `switches`; or "reference", the random walk, and "weidlich_wilkie",
-            the baseline, which are plugins of their own, and whose options (`microsurface=True`) stand for switches.
+        model: a named model, its choices changed by `switches`; "exact", which samples the default model and
+            evaluates the random walk; or "reference", the walk, and "weidlich_wilkie", the baseline, which are plugins
+            of their own, and whose options (`microsurface=True`) stand for switches.
 
     Raises:
         InvalidInput: not a valid material, an unknown model or switch.
@@ -92,12 +97,14 @@ def bsdf(stack: MaterialLike, model: str | Model = DEFAULT, **switches: Any) -> 
 
     described = load(stack)
     if isinstance(model, str) and model in PLUGINS:
-        options = {"type": PLUGINS[model], **switches}
+        options = {**PLUGINS[model], **switches}
     elif isinstance(model, str) and model not in (known := [each.name for each in MODELS]):
         raise InvalidInput(unknown("model", model, [*known, *PLUGINS]))
     else:
-        chosen = named(model, **switches)
+        exact = {"form": "exact"} if switches.get("form") == "exact" else {}  # of the plugin, not of the model
+        chosen = named(model, **{key: value for key, value in switches.items() if key not in exact})
         options = {"type": "layered", "model": chosen.name, **{switch: getattr(chosen, switch) for switch in SWITCHES}}
+        options |= exact
     kernel.mitsuba()
     register()
     return kernel.load_dict({**options, "material": dumps(described, "json")})

@@ -180,7 +180,7 @@ def test_bad_input_is_one_line_and_status_2(
 @pytest.mark.parametrize(
     ("arguments", "words"),
     [
-        (["check", "bare-gold", "--model", "nosuch"], "velatura, reference, weidlich_wilkie)"),
+        (["check", "bare-gold", "--model", "nosuch"], "velatura, reference, exact, weidlich_wilkie)"),
         (["benchmark", "score", "--model", "nosuch"], "unknown entrant 'nosuch' (known: walk, "),
     ],
 )

@@ -30,7 +30,8 @@ Bsdf = Annotated[
     typer.Option(
         "--model",
         metavar="NAME",
-        help=f"{MODELS}; reference, the walk; weidlich_wilkie, the baseline. Default: velatura.",
+        help=f"{MODELS}; reference, the walk; exact, the walk by the model's samples; weidlich_wilkie, the baseline. "
+        "Default: velatura.",
     ),
 ]
 Settings = Annotated[

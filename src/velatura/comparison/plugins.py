@@ -49,7 +49,11 @@ def made(plugin: Plugin, material: Described, microsurface: bool) -> Any:
     if not mi.is_rgb or mi.variant().startswith("scalar"):
         raise InvalidInput(f"models: plugins are compared in llvm_ad_rgb or the like, not in {mi.variant()}")
     if isinstance(plugin, str) and plugin in api.PLUGINS:
-        return api.bsdf(material, plugin, **({"microsurface": microsurface} if plugin == "reference" else {}))
+        often: dict[str, Any] = {
+            "reference": {"microsurface": microsurface},
+            "exact": {"reflectance": "fgd-multi" if microsurface else "fgd"},
+        }
+        return api.bsdf(material, plugin, **often.get(plugin, {}))
     if not plugin:
         raise InvalidInput("models: a name is empty")
     try:

@@ -20,6 +20,8 @@ from velatura.model.variance import Isotropic
 from velatura.optics.ggx import Direction
 from velatura.plugins import bodies, spectral
 
+EXACT = "exact"  # the form whose values are estimates of the walk
+
 GAIN = frozenset({"energy", "white furnace"})  # laws that a gain breaks
 
 #: By form and shape of the stack, the laws that BSDFs do not keep. Light that a lobe sends below the surface is lost.
@@ -53,7 +55,9 @@ def make(mi: Any) -> type:
                 `layer0_rotation`, `layer1_depth`, `layer1_sigma_a`, `layer1_sigma_s`, `layer1_g`, ...
             exterior (number, default 1): absolute index above.
             model (string, default velatura): one of `velatura.MODELS`.
-            reflectance, tir, map, scale, medium, form, fetch, lobes (strings): switches of the model.
+            reflectance, tir, map, scale, medium, form, fetch, lobes (strings): switches of the model. The form may also
+                be `exact`: directions are drawn by the model, with its density, and values are unbiased estimates of
+                the random walk, by which pictures converge to the truth. Gradients are those of the model's values.
 
         One reflected lobe per interface, over a diffuse base if there is one. A stack that ends in a dielectric
         transmits one lobe more, and is lit from both sides; the index above is `exterior`, that below is the last one,
@@ -68,22 +72,38 @@ def make(mi: Any) -> type:
         (`part0_weight`, `part1_layer0_eta`). Value and density are sums by the shares of the stacks; a sample is drawn
         from one of them. Smooth stacks among rough ones are sampled, and have no value. Where some stacks transmit, the
         others absorb light from below.
+
+        Components of the exact form are all that is reflected (glossy), by the diffuse base if there is one, and all
+        that passes. Wholly smooth, uniform stacks are those of the model, which is exact there.
         """
 
         def __init__(self, properties: Any) -> None:
             switches = {name: str(properties[name]) for name in SWITCHES if name in properties}
+            if exact := switches.get("form") == EXACT:
+                switches["form"] = "forward"
             chosen = str(properties["model"]) if "model" in properties else DEFAULT
             model = named(chosen, **switches)
+            if exact and model.closed_form:
+                raise InvalidInput(f"form={EXACT}: of the model {DEFAULT} only, whose samples find all light")
             if model.channels == "separate":
                 raise InvalidInput(
                     "channels=separate: only for lobes and inverse, since a BSDF has one lobe for all colours"
                 )
             if dr.is_jit_v(mi.Float):
                 tables.load().upload(sys.modules[mi.Float.__module__])
-            facts = {"model": model.name, **_changed(model)}
-            super().__init__(properties, partial(LayeredStack, mi, model), {"model", *SWITCHES}, facts)
+            facts = {"model": model.name, **_changed(model), **({"form": EXACT} if exact else {})}
+            super().__init__(
+                properties, partial(_exact() if exact else LayeredStack, mi, model), {"model", *SWITCHES}, facts
+            )
 
     return Layered
+
+
+def _exact() -> type[LayeredStack]:
+    """The stacks of the exact form, which few use."""
+    from velatura.plugins.exact import ExactStack
+
+    return ExactStack
 
 
 def _changed(model: Model) -> dict[str, str]:
@@ -149,7 +169,7 @@ class LayeredStack:
 
     # As light meets it
 
-    def at(self, si: Any, asked: Asked, active: Any) -> LayeredPoint:
+    def at(self, si: Any, asked: Asked, active: Any) -> PointBSDF:
         body, wi, wanted = self.bodies.at(si, active), tuple(si.wi), list(asked.components)
         passing = wanted.pop() if self.transmits else False
         query = Query(all(wanted) or wanted, passing, asked.radiance)

@@ -46,7 +46,10 @@ class Flight:
 def scatter(
     types: Any, meeting: SurfaceMeeting, carried: Value, rng: Any, active: Value, target: Direction, reflected: Value
 ) -> tuple[ScatteringEvent, ScatteringEvent, Any]:
-    """Scatter until the light leaves the interface; also the value for the direction `target`."""
+    """Scatter until the light leaves the interface; also the value for the direction `target`.
+
+    The value of the first facet is its mean over all heights, that of later ones an estimate.
+    """
     # Scatter as if smooth or diffuse, where it is
     once = events.sample(meeting, carried, *(rng.next_float32() for _ in range(3)))
     towards = events.evaluate(meeting, target, reflected)
@@ -62,7 +65,7 @@ def scatter(
         many = replace(
             many, light=ops.select_record(flight.outside, flight.light, flight.light.inverted).seen_by(surface.out_of)
         )
-    value = _weighed(towards, flight.value)
+    value = _weighed(towards, towards.weight * _unmasked(meeting, target, reflected) + flight.value)
     return ops.select_record(rough, many, once), ops.select_record(rough, value, towards), flight.rng
 
 
@@ -88,7 +91,8 @@ def sample_refraction(types: Any, meeting: SurfaceMeeting, rng: Any) -> tuple[Sc
 
 
 def _fly(types: Any, meeting: SurfaceMeeting, carried: Value, rng: Any, active: Value, target: Direction) -> Flight:
-    """Follow light from facet to facet; `target` is a direction away from the surface, up or down."""
+    """Follow light from facet to facet; `target` is a direction away from the surface, up or down, and gathered is what
+    facets after the first send there."""
     import drjit as dr
 
     surface, colour = meeting.layers.surface(meeting.j), carried * 0
@@ -106,7 +110,8 @@ def _fly(types: Any, meeting: SurfaceMeeting, carried: Value, rng: Any, active: 
         i = _reverse(f.w)
         # Send light to the target
         goal = ops.select_record(f.outside, target, _reverse(target))
-        f.value = ops.select(f.alive, f.value + f.weight * _value(meeting, f, i, goal), f.value)
+        again = f.alive & (f.count > 0)
+        f.value = ops.select(again, f.value + f.weight * _value(meeting, f, i, goal), f.value)
         # Meet a facet
         h = ggx.sample_visible(i, *alpha, f.rng.next_float32(), f.rng.next_float32())
         sides = _sides(meeting, f.outside)
@@ -154,6 +159,19 @@ def _value(meeting: SurfaceMeeting, flight: Flight, i: Direction, goal: Directio
     rank = ops.select(same_side, flight.rank, 1 - flight.rank)
     leaves = microsurface.escape(ops.select_record(same_side, goal, _reverse(goal)), rank, *alpha)
     return share * ops.select(serves, density * leaves, 0.0)
+
+
+def _unmasked(meeting: SurfaceMeeting, target: Direction, reflected: Value) -> Value:
+    """Share of the light of a first facet that leaves along `target` without meeting another, over Smith's G1, by which
+    single events lose it: the mean of `microsurface.escape` over the ranks of `microsurface.fly`, r^(1 + Lambda)."""
+    surface = meeting.layers.surface(meeting.j)
+    i, (x, y, z) = surface.into(meeting.wi), surface.into(target)
+    alpha = surface.alpha_u, surface.alpha_v
+    here = microsurface.smith_lambda(i, *alpha)
+    there = ops.maximum(microsurface.smith_lambda((x, y, ops.absolute(z)), *alpha), 0.0)
+    above = (1 + here) / (1 + here + there)
+    below = ops.exp(ops.log_gamma(2 + here) + ops.log_gamma(1 + there) - ops.log_gamma(2 + here + there))
+    return (1 + there) * ops.select(reflected, above, below)
 
 
 def _eta(meeting: SurfaceMeeting, outside: Value) -> Value:

@@ -29,7 +29,7 @@ from velatura.stack.chain import chain
 from velatura.stack.values import Pair
 
 ALPHA_MIN = 1e-5  # an interface smoother than this along both axes is perfectly smooth
-_MATCHED = 1e-3  # and so is one between indices this close, which bends no light
+MATCHED = 1e-3  # and so is one between indices this close, which bends no light
 
 
 @dataclass(frozen=True)
@@ -326,7 +326,7 @@ def _surface(layer: InterfaceValues | BaseValues, above: Value, below: Value) ->
     if isinstance(layer, BaseValues):
         return WalkedSurface(1.0, 1.0, 0.0, False)
     u, v, rotation = layer.alpha_u, layer.alpha_v, layer.rotation
-    matched = layer.kind == "dielectric" and ops.absolute(relative_index(above, below) - 1) < _MATCHED
+    matched = layer.kind == "dielectric" and ops.absolute(relative_index(above, below) - 1) < MATCHED
     smooth = (ops.maximum(u, v) < ALPHA_MIN) | matched
     turn = 0.0 if _is_zero(rotation) else rotation * (pi / 180)
     return WalkedSurface(ops.maximum(u, ALPHA_MIN), ops.maximum(v, ALPHA_MIN), turn, smooth)

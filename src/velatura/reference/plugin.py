@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from velatura import kernel, metals
+from velatura import kernel, metals, ops
 from velatura.binding import Asked, Binding, plugin_class
 from velatura.errors import InvalidInput
 from velatura.reference import proxy
@@ -17,7 +17,8 @@ from velatura.reference.layers import ALPHA_MIN, WalkedLayers, from_material, re
 from velatura.reference.metal import WAVELENGTHS
 from velatura.reference.next_event import way_out
 from velatura.reference.walk import Path, walk
-from velatura.stack import InterfaceValues, LayerValues
+from velatura.stack import Address, InterfaceValues, LayerValues
+from velatura.stack.values import Pair
 
 _MAX_DEPTH = 1000
 
@@ -72,11 +73,12 @@ def make(mi: Any) -> type:
 
 @dataclass(frozen=True)
 class Settings:
-    """How paths walk: properties of the plugin."""
+    """How paths walk: properties of the plugin, and the least roughness of interfaces."""
 
     seed: int
     max_depth: int
     microsurface: bool
+    least_alpha: float = 0.0
 
     @property
     def facts(self) -> dict[str, str]:
@@ -106,8 +108,9 @@ class WalkedStack:
         # An interface whose roughness varies may be smooth here and rough there
         widest = [_widest(seen.layers[k]) for k in seen.surfaces]
         scatters = any(layer.spreads for k, layer in enumerate(seen.layers) if k not in seen.surfaces)
-        rough = [alpha is None or alpha >= ALPHA_MIN for alpha in widest]
-        smooth = [alpha is None or alpha < ALPHA_MIN for alpha in widest]
+        least = self.settings.least_alpha
+        rough = [alpha is None or max(alpha, least) >= ALPHA_MIN for alpha in widest]
+        smooth = [least < ALPHA_MIN and (alpha is None or alpha < ALPHA_MIN) for alpha in widest]
         self.transmits, self.painted = binding.stack.transmits, binding.stack.base is not None
         self.glossy = scatters or any(rough)
         # Declare them
@@ -129,9 +132,16 @@ class WalkedStack:
     def layers(self, si: Any, active: Any, flipped: Any) -> WalkedLayers:
         """The layers at a point, seen from below where `flipped`."""
         material = self.binding.at(si, active)
-        material = material.each(lambda address, value: 0.0 if address in self.zeros else value)
+        material = material.each(self._walked)
         layers = from_material(self.mi, material, self.settings.microsurface)
         return layers.reversed(flipped) if self.transmits else layers
+
+    def _walked(self, address: Address, value: Any) -> Any:
+        """A value of a material as paths meet it."""
+        if address in self.zeros:
+            return 0.0
+        least = self.settings.least_alpha
+        return ops.maximum(value, least) if least and isinstance(address.declared, Pair) else value
 
     def stream(self, *numbers: Any) -> Any:
         """Random numbers that follow from the seed and from the query."""

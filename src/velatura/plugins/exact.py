@@ -1,0 +1,106 @@
+"""The form `exact` of `layered`: directions by the model, values by an unbiased estimate of the random walk."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from velatura.binding import Asked, Binding, Image, PointBSDF
+from velatura.errors import InvalidInput
+from velatura.model import Model
+from velatura.model.base import Body, Query
+from velatura.model.guards import ALPHA_MIN
+from velatura.plugins import bodies, spectral
+from velatura.plugins.layered import EXACT, LayeredStack
+from velatura.reference.layers import MATCHED
+from velatura.reference.plugin import Settings, WalkedPoint, WalkedStack
+
+_MAX_DEPTH = 1000
+
+#: Laws of `velatura.checks` that walks do not keep, and this does, since its samples are those of the model.
+KEPT = frozenset({"normalisation", "chi-square", "weights"})
+
+
+class ExactStack(LayeredStack):
+    """One stack: sampled by a model, evaluated by walks.
+
+    Wholly smooth, uniform stacks are those of the model, which is exact there. Other interfaces are at least as rough
+    as the model has them.
+    """
+
+    def __init__(self, mi: Any, model: Model, binding: Binding) -> None:
+        settings = Settings(seed=0, max_depth=_MAX_DEPTH, microsurface=model.microsurface, least_alpha=ALPHA_MIN)
+        self.walked = WalkedStack(mi, settings, binding)
+        super().__init__(mi, model, binding)
+
+    @property
+    def exceptions(self) -> frozenset[str]:
+        return super().exceptions if self.delta else (self.walked.exceptions - KEPT) | {"spread"}
+
+    def _update(self, before: bodies.Bodies | None) -> None:
+        super()._update(before)
+        self.walked.update()
+        if self.delta:
+            return
+        if self.transmits and self._is_straight():
+            raise InvalidInput(
+                f"form={EXACT}: no interface bends light, which passes straight; layered_reference has that"
+            )
+        self.kinds, self.components = self.walked.kinds, self.walked.components
+
+    def _is_straight(self) -> bool:
+        """Whether interfaces are known to bend no light, as between media of equal index."""
+        seen = self.binding.with_constants()
+        index = [layer.eta for layer in seen.interfaces]
+        if any(isinstance(eta, Image) for eta in index):
+            return False
+        means = np.array([np.mean(np.array(eta)) for eta in (seen.exterior, *index)])
+        return bool(np.all(np.abs(means[1:] / means[:-1] - 1) < MATCHED))
+
+    def at(self, si: Any, asked: Asked, active: Any) -> PointBSDF:
+        if self.delta:
+            return super().at(si, asked, active)
+        wanted = dict(zip(self.kinds, asked.components))
+        passing = wanted.get(self.mi.BSDFFlags.GlossyTransmission, False)
+        reflecting = sum(asked.components) > passing
+        body = self.bodies.at(si, active).at_direction(tuple(si.wi))
+        walked = WalkedPoint(self.walked, si, wanted, asked.radiance)
+        return ExactPoint(self, body, Query(reflecting, passing, asked.radiance), walked)
+
+
+@dataclass(frozen=True)
+class ExactPoint(PointBSDF):
+    """A stack at a surface point, for light from one direction; `asked` are the sides that samples are drawn for."""
+
+    stack: ExactStack
+    body: Body
+    asked: Query
+    walked: WalkedPoint
+
+    def draw(self, sample1: Any, sample2: Any, active: Any) -> tuple[Any, Any]:
+        import drjit as dr
+
+        mi, kinds, wi = self.stack.mi, self.stack.kinds, self.walked.si.wi
+        bs = dr.zeros(mi.BSDFSample3f)
+        drawn, bs.eta = self.body.sample(tuple(wi), sample1, sample2.x, sample2.y, self.asked)
+        bs.wo = mi.Vector3f(*drawn)
+        first = next((k for k, kind in enumerate(kinds) if self.walked.asked[kind]), 0)
+        passed = wi.z * bs.wo.z < 0
+        bs.sampled_component = dr.select(passed, mi.UInt32(len(kinds) - 1), mi.UInt32(first))
+        bs.sampled_type = dr.select(passed, mi.UInt32(+kinds[-1]), mi.UInt32(+kinds[first]))
+        return bs, None
+
+    def eval_pdf(self, wo: Any, active: Any) -> tuple[Any, Any]:
+        import drjit as dr
+
+        mi, wi = self.stack.mi, self.walked.si.wi
+        of_model, pdf = self.body.eval_pdf(tuple(wi), tuple(wo), self.asked)
+        with dr.suspend_grad():
+            value = self.walked.eval(wo, active)
+        # No gradient passes the loop of a walk
+        of_model = mi.depolarizer(spectral.carried(mi, of_model)) & active
+        if dr.grad_enabled(of_model):
+            value = of_model + dr.detach(value - of_model)
+        return value, dr.select(active, pdf, 0)
