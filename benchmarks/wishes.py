@@ -1,13 +1,13 @@
 """How near the answers to further wishes are, by random walks, to what was asked for.
 
-    python benchmarks/wishes.py [--kinds grazing passed body film] [--wishes 10] [--paths 100000] [--seed 0]
+    python benchmarks/wishes.py [--kinds grazing passed body film mixture] [--wishes 10] [--paths 100000] [--seed 0]
 
 Wishes are what another random stack of the same form shows: energies at a second angle of another stack with the same
-lobes, what a pane of another tint and blur passes, the colours of another base and of another thickness. So each has an
-answer, though the search may not find it. Prints, for each kind, quantiles of how far the walk through the answer is
-from what was asked, relative to it, and of the processor's time of an answer. A film is held against the nearest
-colour, which the answer states. Fails if half of the energies of a kind are more than 2 % away, or half of the
-roughnesses more than 5 %.
+lobes, what a pane of another tint and blur passes, the colours of another base, of another thickness, and of other
+weights. So each has an answer, though the search may not find it. Prints, for each kind, quantiles of how far the walk
+through the answer is from what was asked, relative to it, and of the processor's time of an answer. A film is held
+against the nearest colour, which the answer states. Fails if half of the energies of a kind are more than 2 %
+away, or half of the roughnesses more than 5 %.
 """
 
 from __future__ import annotations
@@ -22,10 +22,12 @@ from rows import parsed, row
 
 from velatura import reference
 from velatura.inverse import Infeasible, Target, alternatives, answer
+from velatura.inverse.wishes.mixture import MixtureColour
 from velatura.inverse.wishes.passed import haze
+from velatura.model import named
 from velatura.model.registry import stack_lobes
 from velatura.reference import batches
-from velatura.stack import Diffuse, Interface, Medium, Stack
+from velatura.stack import Diffuse, Interface, Medium, Mix, Stack
 from velatura.stack.values import Film
 
 MODEL = "velatura"
@@ -91,16 +93,33 @@ def film(rng: np.random.Generator) -> dict[str, Any]:
     return {"start": present, "film": {"energy": tuple(np.sum(shown(other, 0).energy, axis=0)[:, 0].tolist())}}
 
 
+def mixture(rng: np.random.Generator) -> dict[str, Any]:
+    """The colour of other weights of two coated bases and a metal."""
+    coated = [
+        Stack([Interface(eta=rng.uniform(1.3, 1.8), alpha=rng.uniform(0, 0.3)), Diffuse(albedo=colour(rng, 0.05, 0.9))])
+        for _ in range(2)
+    ]
+    parts = [*coated, Stack([Interface(eta=colour(rng, 0.2, 2.0), k=3.0, alpha=rng.uniform(0.05, 0.3))])]
+    present, other = (Mix(zip(rng.dirichlet(np.ones(3)).tolist(), parts)) for _ in range(2))
+    angle = float(rng.uniform(0, 60))
+    wish = MixtureColour(energy=0.5, angle=angle).had_by(other, named(MODEL))
+    return {"start": present, "mixture": wish.to_dict()}
+
+
 KINDS: dict[str, Callable[[np.random.Generator], dict[str, Any]]] = {
     "grazing": grazing,
     "passed": passed,
     "body": body,
     "film": film,
+    "mixture": mixture,
 }
 
 
-def walked(kind: str, stack: Stack, angle: float, paths: int, seed: int) -> dict[str, Any]:
+def walked(kind: str, stack: Stack | Mix, angle: float, paths: int, seed: int) -> dict[str, Any]:
     """Energy (3,) and roughness of what a wish is about, by walks."""
+    if isinstance(stack, Mix):
+        each = (share * walked(kind, part, angle, paths, seed)["energy"] for share, part in stack.weighted(""))
+        return {"energy": sum(each)}
     found = reference.statistics(stack, np.cos(np.radians(angle)), paths=paths, seed=seed, microsurface=True)
     if kind == "passed":
         assert found.transmitted

@@ -2,8 +2,8 @@
 Wishes beyond lobes
 ===================
 
-What a pane passes, the colour of paint under a coat, the colour of an oxide, and the look at grazing angles: each wish
-changes the values that it is about, and the picture shows what was asked for beside what the stack has.
+What a pane passes, the colours of paint under a coat, of a mixture and of an oxide, and the look at grazing angles:
+each wish changes the values that it is about, and the picture shows what was asked for beside what the stack has.
 """
 
 import matplotlib.pyplot as plt
@@ -30,15 +30,27 @@ def swatches(ax, title, found):
     ax.set(title=title, xticks=[], yticks=[0.75, 0.25], yticklabels=["asked", "has"])
 
 
-figure, axes = plt.subplots(2, 2, figsize=(8, 4.6), layout="constrained")
+places = [["pane", "paint", "mixture"], ["film", "edge", "edge"]]
+figure, axes = plt.subplot_mosaic(places, figsize=(9, 4.6), layout="constrained")
 
 # %%
 # A pane and its tint and haze, and the colour of paint as it is seen through its coat.
 
 tinted = vt.inverse.answer({"start": PANE, "passed": {"energy": [0.15, 0.45, 0.55], "haze": 0.8}})
 painted = vt.inverse.answer({"start": PLASTIC, "body": {"energy": [0.03, 0.12, 0.4]}})
-swatches(axes[0, 0], f"passes a tint, haze {tinted.reached.passed[0].haze:.2f}", tinted)
-swatches(axes[0, 1], "paint under its coat", painted)
+swatches(axes["pane"], f"passes a tint, haze {tinted.reached.passed[0].haze:.2f}", tinted)
+swatches(axes["paint"], "paint under its coat", painted)
+
+# %%
+# Flakes and pigment side by side, and the share of the flakes that gives a colour.
+
+mixed = vt.inverse.answer({"start": "half-metallic-paint", "mixture": {"energy": [0.1, 0.175, 0.34]}})
+(wish,) = mixed.target.mixture
+shares = np.linspace(0, 1, 65)
+colours = [shown(wish.had_by(mixed.stack.replace(part0_weight=share), mixed.model).energy) for share in shares]
+axes["mixture"].imshow(np.array(colours)[None], extent=(0, 1, 0, 1), aspect="auto")
+axes["mixture"].axvline(mixed.stack.flat()["part0_weight"], color="white", linestyle="--")
+axes["mixture"].set(title="a colour by its weight of flakes", xlabel="weight of flakes", yticks=[])
 
 # %%
 # The colour of an oxide by its thickness, and the thicknesses whose colours are nearest to a blue.
@@ -50,10 +62,10 @@ colours = [
     shown(vt.lobes(found[0].stack.replace(layer0_film0_thickness_nm=nm), 1.0, model="weier2020").energy[0][:, 0])
     for nm in thickness
 ]
-axes[1, 0].imshow(np.array(colours)[None], extent=(0, 400, 0, 1), aspect="auto")
+axes["film"].imshow(np.array(colours)[None], extent=(0, 400, 0, 1), aspect="auto")
 for each in found:
-    axes[1, 0].axvline(each.stack.flat()["layer0_film0_thickness_nm"], color="white", linestyle="--")
-axes[1, 0].set(title="the nearest blues of an oxide", xlabel="thickness, nm", yticks=[])
+    axes["film"].axvline(each.stack.flat()["layer0_film0_thickness_nm"], color="white", linestyle="--")
+axes["film"].set(title="the nearest blues of an oxide", xlabel="thickness, nm", yticks=[])
 
 # %%
 # Two stacks with one lobe at normal incidence, of which one is brighter at 75 degrees.
@@ -62,6 +74,6 @@ angles = np.arange(0, 86, 2)
 for energy in (0.22, 0.27):
     stack = vt.inverse.answer({"lobes": PAIR, "grazing": {"energy": energy}}, "bati2021").stack
     lobes = vt.lobes(stack, np.cos(np.radians(angles)), model="bati2021")
-    (line,) = axes[1, 1].plot(angles, np.sum(lobes.energy, axis=0)[1])
-    axes[1, 1].plot(75, energy, "o", color=line.get_color())
-axes[1, 1].set(title="the same lobe, other energies at 75°", xlabel="angle of incidence", ylabel="reflected")
+    (line,) = axes["edge"].plot(angles, np.sum(lobes.energy, axis=0)[1])
+    axes["edge"].plot(75, energy, "o", color=line.get_color())
+axes["edge"].set(title="the same lobe, other energies at 75°", xlabel="angle of incidence", ylabel="reflected")

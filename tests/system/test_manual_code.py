@@ -130,7 +130,8 @@ def files_of_readme(folder: Path) -> None:
 
 
 def files_of_inverse(folder: Path) -> None:
-    names = "target.yaml", None, "pane.yaml", "bright-edge.yaml", "workshop.yaml", "metal.yaml", "blue-over-red.yaml"
+    further = "pane.yaml", "bright-edge.yaml", "flakes.yaml", "workshop.yaml"
+    names = "target.yaml", None, *further, "metal.yaml", "blue-over-red.yaml"
     for name, text in zip(names, written("docs/how-to/inverse.md", "yaml")):
         if name:
             (folder / name).write_text(text)

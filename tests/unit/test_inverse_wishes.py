@@ -13,10 +13,12 @@ import pytest
 
 import velatura as vt
 from velatura.inverse import Infeasible, Target, answer, answers, invert_stack
+from velatura.inverse.answer import nearest_answers
 from velatura.inverse.wishes import KINDS
 from velatura.inverse.wishes.passed import haze, roughness
 from velatura.inverse.wishes.wish import compared
-from velatura.stack import Diffuse, Interface, Medium, Stack
+from velatura.model import named
+from velatura.stack import Diffuse, Interface, Medium, Mix, Stack
 from velatura.stack.values import Film
 
 PANE = Stack([Interface(eta=1.5, alpha=0.1), Medium(depth=1.0, sigma_a=0.1), Interface(eta=1.0, alpha=0.1)])
@@ -24,6 +26,8 @@ CLEAR = Stack([PANE.layers[0], PANE.layers[2]])
 PLASTIC = Stack([Interface(eta="polystyrene", alpha=0.1), Diffuse(albedo=0.5)])
 COATED = Stack([Interface(eta=1.5, alpha=0.1), Medium(sigma_a=0.1), Interface(eta=1.5, k=3.0, alpha=0.2)])
 OXIDE = Stack([Interface(eta=(2.7, 2.5, 2.2), k=(3.8, 3.4, 3.0), films=(Film(eta=2.4, thickness_nm=50.0),))])
+RED, BLUE = (Stack([Diffuse(albedo=albedo)]) for albedo in ((0.8, 0.1, 0.1), (0.1, 0.2, 0.6)))
+DUST = Mix([(0.5, Stack([Interface(eta=1.5), Diffuse(albedo=0.1)])), (None, Stack([Diffuse(albedo=0.6)]))])
 PAIR = [{"energy": 0.15, "alpha": 0.1, "interfaces": 2}]
 
 #: A wish that can be met of each kind, and the keys of values that may change for it.
@@ -32,6 +36,7 @@ WISHES: dict[str, tuple[dict[str, Any], set[str]]] = {
     "passed": ({"start": PANE, "passed": {"energy": (0.5, 0.3, 0.6), "haze": 0.7}}, {"sigma_a", "alpha_u", "alpha_v"}),
     "body": ({"start": PLASTIC, "body": {"energy": (0.2, 0.05, 0.3)}}, {"albedo"}),
     "film": ({"start": OXIDE, "film": {"energy": (0.3, 0.2, 0.1), "thickest_nm": 200.0}}, {"film0_thickness_nm"}),
+    "mixture": ({"start": DUST, "mixture": {"energy": 0.45}}, {"weight"}),
 }
 
 
@@ -58,10 +63,40 @@ def test_what_no_wish_is_about_stays(kind: str) -> None:
     assert changed and changed <= moving
 
 
+def test_weights_of_chalks_are_those_of_their_albedos() -> None:
+    """The limit: nothing lies above the bases, of which one is a mixture itself, and light adds up."""
+    wish = {
+        "start": Mix([(0.2, RED), (None, Mix([(0.5, BLUE), (None, RED)]))]),
+        "mixture": {"energy": (0.59, 0.13, 0.25)},
+    }
+    assert answer(wish).stack.flat()["part0_weight"] == pytest.approx(0.4, abs=1e-4)
+
+
+def test_no_other_weights_have_a_nearer_colour() -> None:
+    """Truth: all weights of three chalks in steps of .01; a grey brighter than all that they give."""
+    albedos = np.array([[0.8, 0.1, 0.1], [0.1, 0.2, 0.6], [0.3, 0.5, 0.1]])
+    mix = Mix(zip((0.2, 0.3, None), (Stack([Diffuse(albedo=tuple(each))]) for each in albedos)))
+    found = nearest_answers(Target(start=mix, mixture={"energy": 0.6}), 1, named("velatura"))[0]
+    shares = [(a, b, 1 - a - b) for a in np.linspace(0, 1, 101) for b in np.linspace(0, 1 - a, 101)]
+    brute = min(float(np.linalg.norm(compared(share @ albedos, None) - compared(0.6, None))) for share in shares)
+    assert not found.met and brute - 1e-3 < found.missed <= brute + 1e-6
+
+
+def test_a_start_may_be_named_like_a_preset() -> None:
+    by_name, itself = (Target(start=start, body={"energy": 0.2}) for start in ("red-enamel", vt.preset("red-enamel")))
+    assert by_name == itself
+
+
 def test_a_base_alone_has_the_albedo_that_is_seen() -> None:
     """The limit: nothing lies above it."""
     found = answer({"start": Stack([Diffuse(albedo=0.9)]), "body": {"energy": (0.1, 0.3, 0.8)}}).stack
     assert found.flat()["layer0_albedo"] == pytest.approx((0.1, 0.3, 0.8), abs=1e-4)
+
+
+def test_a_base_alone_looks_the_same_at_grazing() -> None:
+    """The limit: no interface reflects in a lobe."""
+    chalk = {"start": Stack([Diffuse(albedo=0.5)]), "grazing": {"energy": 0.5}}
+    assert answer(chalk, "bati2021").missed < 1e-6
 
 
 def test_a_medium_without_interfaces_passes_light_by_its_depth() -> None:
@@ -119,6 +154,7 @@ def test_a_wish_at_grazing_keeps_the_lobes_of_the_present_material() -> None:
         ({"start": CLEAR, "passed": {"energy": 0.5}}, "passed: no medium absorbs"),
         ({"start": CLEAR, "body": {"energy": 0.2}}, "body: no medium scatters"),
         ({"start": COATED, "film": {"energy": 0.2, "thickest_nm": 100.0}}, "film: no interface has films"),
+        ({"start": DUST, "mixture": {"energy": 0.9}}, "no weights of these parts give mixture energy 0.9"),
         ({"start": PANE, "passed": {"energy": 0.99}}, "no stack of these layers is found that has passed energy 0.99"),
         (
             {"start": COATED, "grazing": {"energy": 0.9}},
@@ -130,7 +166,7 @@ def test_what_cannot_be_is_refused_with_a_way_out_that_can(wish: dict[str, Any],
     with pytest.raises(Infeasible) as caught:
         answer(wish, "bati2021")
     assert caught.value.why.startswith(why)
-    assert answer(caught.value.directions[0].target.to_dict(), "bati2021").stack.layers
+    assert answer(caught.value.directions[0].target.to_dict(), "bati2021").stack.flat()
 
 
 @pytest.mark.parametrize(
@@ -158,9 +194,16 @@ def test_what_cannot_be_is_refused_with_a_way_out_that_can(wish: dict[str, Any],
         ({"lobes": PAIR, "available": ["watr"]}, "available: eta: unknown name 'watr' (did you mean water?)"),
         ({"lobes": PAIR, "available": ["Au"]}, "available: holds no substance for any interface; name dielectrics"),
         ({"start": PANE, "available": ["water"]}, "available: chooses indices of lobes; write lobes"),
+        ({"start": PANE, "mixture": {"energy": 0.5}}, "mixture: chooses weights; write a start with mix"),
+        ({"start": DUST, "body": {"energy": 0.5}}, "start: the inverse takes a single stack, not a mixture, of which"),
+        (
+            {"start": "worn-painted-steel", "mixture": {"energy": 0.5}},
+            "part0_weight: is a texture, and is to be chosen",
+        ),
+        ({"start": "pane.yaml", "body": {"energy": 0.5}}, "start: unknown preset 'pane.yaml'"),
         ({"start": PANE, "passed": {"colour": 1}}, "passed: unknown key 'colour'"),
         ({"passed": {"energy": 0.5}}, "lobes: must hold at least one lobe; without any, write a start"),
-        ({}, "lobes: must hold at least one lobe, or grazing, passed, body, film with a start"),
+        ({}, "lobes: must hold at least one lobe, or grazing, passed, body, film, mixture with a start"),
     ],
 )
 def test_what_is_no_wish_is_refused_in_one_line(wish: dict[str, Any], words: str) -> None:

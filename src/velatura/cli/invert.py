@@ -73,7 +73,8 @@ def invert(
       tint        of a conductor, 0 (strongest edge tint) to 1
       fixed       {eta, k, alpha, tau, films}: of each interface, or null: [1.5]
     Of the whole: exterior (1), eta_max (4), channels (mean or separate), name;
-      start       a material, as a file has it, with which the search begins
+      start       a material, as a file has it, or a preset's name, with which
+                  the search begins
       available   substances that interfaces may lie above: [water, bk7, 1.6, Au]
 
     Wishes beyond these, of lobes or of a start alone: energy, and angle (degrees):
@@ -84,6 +85,7 @@ def invert(
       body        the colour of a base or scattering medium, seen from outside
       film        the colour by a film's thickness; layer, film,
                   thinnest_nm, thickest_nm
+      mixture     the colour of a start with mix, by the weights of its parts
     """
     # Refuse what cannot work before anything slow begins
     from velatura import inverse

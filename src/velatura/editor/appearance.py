@@ -26,6 +26,7 @@ from velatura.model.registry import stack_lobes
 from velatura.model.roughness_maps import MAPS
 from velatura.model.variance import Roughness
 from velatura.stack import Diffuse, Interface, Stack, Varying
+from velatura.stack.mix import Described
 
 ALIKE = 1e-5  # difference of variances of neighbours that are one lobe
 SAVED = tuple(str(n) for n in range(15, 23))  # figures of Bati et al. 2021
@@ -298,7 +299,7 @@ def ways(body: Body) -> Answer:
     return {"ways": [{"words": "another stack that has it", "target": _plain(wish, found.stack)}]}
 
 
-def _plain(target: Target, start: Stack | None = None) -> Answer:
+def _plain(target: Target, start: Described | None = None) -> Answer:
     """A target as a body holds it, and the stack that has it."""
     start = start or target.start
     found = described(target.model_copy(update={"start": None}))

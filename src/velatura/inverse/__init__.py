@@ -22,7 +22,7 @@ from velatura.inverse.measured import load_table
 from velatura.inverse.paints import Paint, PigmentFit, fit_pigment, load_reflectances, paint, paint_colour
 from velatura.inverse.reasons import Direction, Infeasible
 from velatura.inverse.solution import Solution
-from velatura.inverse.wishes import Body, FilmColour, Grazing, Passed
+from velatura.inverse.wishes import Body, FilmColour, Grazing, MixtureColour, Passed
 
 __all__ = [
     "Above",
@@ -41,6 +41,7 @@ __all__ = [
     "Grazing",
     "Infeasible",
     "Layers",
+    "MixtureColour",
     "MixtureFit",
     "ModelError",
     "Other",

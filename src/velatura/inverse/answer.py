@@ -25,13 +25,15 @@ from velatura.inverse.local.approach import Secants
 from velatura.inverse.reasons import Direction, Infeasible
 from velatura.inverse.wishes import KINDS
 from velatura.inverse.wishes.available import made_of
+from velatura.inverse.wishes.mixture import weighed
 from velatura.inverse.wishes.wish import compared
 from velatura.model import DEFAULT, Model
 from velatura.model.lobe_statistics import StackLobes
 from velatura.model.registry import stack_lobes
 from velatura.model.roughness_maps import MAPS
 from velatura.model.variance import Covariance, Roughness
-from velatura.stack import Interface, Medium, Stack
+from velatura.stack import Interface, Medium, Mix, Stack
+from velatura.stack.io import Loaded
 
 FIRST = 30.0  # weight of lobes beside other wishes
 WIDTHS, BLURRED = 0.2, 0.02  # weight of variances, relative to themselves and this
@@ -57,12 +59,12 @@ QUICK, THOROUGH = _Effort(1, 8, 2), _Effort(2, 20, 5)  # under the hand, and at 
 
 @dataclass(frozen=True)
 class Answer:
-    """A stack, and how near it comes to a wish.
+    """A stack, and how near it comes to a wish; of a wish for a mixture that is the `stack`.
 
     missed: the distance, in hundreds of CIE 1976 and five times a roughness; of lobes thirty times as much.
     """
 
-    stack: Stack
+    stack: Loaded
     target: Target
     model: Model
     missed: float
@@ -70,6 +72,9 @@ class Answer:
     @cached_property
     def reached(self) -> Target:
         """The wish, with what the stack has of what is asked for."""
+        if isinstance(self.stack, Mix):
+            has = tuple(wish.had_by(self.stack, self.model) for wish in self.target.mixture)
+            return self.target.model_copy(update={"mixture": has})
         return _Seen.of(self.target, self.stack, self.model).reached
 
     @property
@@ -118,6 +123,9 @@ def answers(
 
 def nearest_answers(wanted: Target, count: int, model: Model, seed: int = 0, quick: bool = False) -> list[Answer]:
     """The nearest stacks to further wishes, met or not. Raises InvalidInput, Infeasible where the layers cannot."""
+    if isinstance(wanted.start, Mix):
+        mix, missed = weighed(wanted.start, wanted.mixture, model)
+        return [Answer(mix, wanted, model, missed)]
     starts = _starts(wanted, count, model, seed)
     for wish in wanted.further:
         lacking = wish.lacking(starts[0])
@@ -146,7 +154,7 @@ def nearest_answers(wanted: Target, count: int, model: Model, seed: int = 0, qui
 
 def _starts(wanted: Target, count: int, model: Model, seed: int) -> list[Stack]:
     """The present material, or else stacks that have the lobes."""
-    if wanted.start:
+    if isinstance(wanted.start, Stack):
         return [wanted.start]
     alone = wanted.model_copy(update={key: () for key in wanted.beyond_lobes})
     drawn = max(DRAWN, count), model.surrogate, seed
@@ -209,7 +217,12 @@ def refused(found: Answer) -> Infeasible:
     _, wish, has = max(off, key=lambda each: each[0])
     lobes = " with its lobes" if found.target.lobes or wish.keeps_lobes else ""
     way = Direction(wish.key, has.words(), found.missed, found.reached.model_copy(update={"start": found.stack}))
-    return Infeasible(f"no stack of these layers{lobes} is found that has {wish.words()}", 0, wish.key, [way])
+    nothing = (
+        "no weights of these parts give"
+        if wish.key == "mixture"
+        else f"no stack of these layers{lobes} is found that has"
+    )
+    return Infeasible(f"{nothing} {wish.words()}", 0, wish.key, [way])
 
 
 def _alike(one: Stack, other: Stack) -> bool:

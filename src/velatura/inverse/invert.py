@@ -42,7 +42,7 @@ def invert_stack(
     wanted = read(target).of_lobes()
     chosen, start = model_of(wanted, model, **switches), wanted.start
     wanted = wanted.model_copy(update={"start": None})
-    begun = refined.from_start(start, wanted, chosen) if start else None
+    begun = refined.from_start(start, wanted, chosen) if isinstance(start, Stack) else None
     if isinstance(begun, Direction):
         raise infeasible(wanted, chosen).nearer(begun)
     found = begun or search(wanted, chosen)

@@ -11,10 +11,11 @@ import numpy as np
 from pydantic import model_validator
 
 from velatura.errors import InvalidInput, within
-from velatura.inverse.wishes import KINDS, Available, Body, FilmColour, Grazing, Passed, Wish, Wished
+from velatura.inverse.wishes import KINDS, Available, Body, FilmColour, Grazing, MixtureColour, Passed, Wish, Wished
 from velatura.model.roughness_maps import MAPS, RoughnessMap
 from velatura.model.variance import Covariance, Isotropic, PerAxis, Roughness, Variance
-from velatura.stack import RGB, Mix, Stack, io, single
+from velatura.stack import RGB, Mix, Stack, io
+from velatura.stack.mix import Described
 from velatura.stack.schema import Parameter, Record, show
 from velatura.stack.values import INDEX_HIGH, INDEX_LOW, Choice, Colour, Film, Films, Pair, Scalar, Text, Whole
 
@@ -51,17 +52,17 @@ class Entries(Parameter):
 
 @dataclass(frozen=True)
 class Start(Parameter):
-    """A material."""
+    """A material, or the name of a preset; no file, since a target may be a stranger's."""
 
     @property
     def values(self) -> str:
-        return "a material"
+        return "a material, or the name of a preset"
 
-    def check(self, value: Any) -> Stack:
-        if not isinstance(value, Stack | Mix | Mapping):
+    def check(self, value: Any) -> Described:
+        if not isinstance(value, Stack | Mix | Mapping | str):
             raise self.refuse(value)
         try:
-            return single(value, "the inverse")
+            return io.preset(value) if isinstance(value, str) else io.load(value)
         except InvalidInput as error:
             raise ValueError(str(error)) from None
 
@@ -228,11 +229,12 @@ class Target(Record):
         Choice("one variance for all colours or the brightest one's; else the model's", options=("mean", "separate")),
     ] = None
     lobes: tuple[TargetLobe, ...]
-    start: Annotated[Stack | None, Start("material that the search begins with, of as many interfaces")] = None
+    start: Annotated[Stack | Mix | None, Start("material that the search begins with, of as many interfaces")] = None
     grazing: Annotated[tuple[Grazing, ...], Wished("at a second angle", record=Grazing)] = ()
     passed: Annotated[tuple[Passed, ...], Wished("of what passes", record=Passed)] = ()
     body: Annotated[tuple[Body, ...], Wished("of a diffuse base or a medium that scatters", record=Body)] = ()
     film: Annotated[tuple[FilmColour, ...], Wished("of the colour of a film", record=FilmColour, most=1)] = ()
+    mixture: Annotated[tuple[MixtureColour, ...], Wished("of the colour of a mixture", record=MixtureColour)] = ()
     available: Annotated[tuple[Any, ...], Available("substances that interfaces may lie above")] = ()
 
     def __init__(self, /, lobes: Iterable[TargetLobe | Mapping[str, Any]] = (), **options: Any) -> None:
@@ -247,6 +249,10 @@ class Target(Record):
         if not self.lobes and not (self.further and self.start):
             other = "; without any, write a start" if self.further else f", or {', '.join(KINDS)} with a start"
             raise ValueError(f"lobes: must hold at least one lobe{other}")
+        if isinstance(self.start, Mix) and (self.lobes or any(wish.key != MixtureColour.key for wish in self.further)):
+            raise ValueError(
+                "start: the inverse takes a single stack, not a mixture, of which only mixture may be asked"
+            )
         for n, lobe in enumerate(self.lobes[:-1], 1):
             if lobe.base != "dielectric":
                 raise ValueError(f"lobe {n}: base: only the last lobe may have a {lobe.base}, nothing lies below it")
@@ -254,7 +260,7 @@ class Target(Record):
             if wish.lobe is not None and wish.lobe > len(self.lobes):
                 raise ValueError(f"grazing: lobe: the target has {len(self.lobes)}, got {wish.lobe}")
         wanted = sum(lobe.interfaces for lobe in self.lobes)
-        if self.lobes and self.start is not None and len(self.start.interfaces) != wanted:
+        if self.lobes and isinstance(self.start, Stack) and len(self.start.interfaces) != wanted:
             found = len(self.start.interfaces)
             raise ValueError(f"start: must have as many interfaces as the lobes, {wanted}, got {found}")
         return self

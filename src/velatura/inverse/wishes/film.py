@@ -10,7 +10,7 @@ import numpy as np
 from pydantic import model_validator
 
 from velatura.errors import InvalidInput
-from velatura.inverse.wishes.wish import Lacking, Wish, colour, compared
+from velatura.inverse.wishes.wish import Lacking, Wish, colour, compared, reflected
 from velatura.model.lobe_statistics import StackLobes
 from velatura.model.registry import stack_lobes
 from velatura.stack import Interface, Stack
@@ -49,7 +49,7 @@ class FilmColour(Wish):
         return self
 
     def shown(self, seen: StackLobes, n: int, groups: Sequence[Sequence[int]]) -> dict[str, Any]:
-        return {"energy": colour(np.sum(seen.energy, axis=0)[:, n] + seen.remainder[:, n])}
+        return {"energy": colour(reflected(seen)[:, n])}
 
     def place(self, stack: Stack) -> int | None:
         """The layer of the film, None if the stack has no such film."""

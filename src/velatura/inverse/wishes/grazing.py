@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any, ClassVar
 import numpy as np
 from pydantic import model_validator
 
-from velatura.inverse.wishes.wish import STEEPEST, Lacking, Wish, colour, compared
+from velatura.inverse.wishes.wish import STEEPEST, Lacking, Wish, colour, compared, reflected
 from velatura.model.lobe_statistics import StackLobes
 from velatura.stack import Stack
 from velatura.stack.values import Scalar, Whole
@@ -46,7 +46,7 @@ class Grazing(Wish):
 
     def shown(self, seen: StackLobes, n: int, groups: Sequence[Sequence[int]]) -> dict[str, Any]:
         if self.lobe is None:
-            return {"energy": colour(np.sum(seen.energy, axis=0)[:, n] + seen.remainder[:, n])}
+            return {"energy": colour(reflected(seen)[:, n])}
         own = groups[self.lobe - 1]
         energy = np.sum([seen.energy[k][:, n] for k in own], axis=0)
         return {"energy": colour(energy), "alpha": float(np.mean([seen.alpha[k][:, n] for k in own]))}

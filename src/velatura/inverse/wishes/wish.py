@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any, ClassVar, TypeVar
 import numpy as np
 from pydantic import model_validator
 
-from velatura.model.lobe_statistics import StackLobes
+from velatura.model.lobe_statistics import MixtureLobes, StackLobes
 from velatura.results import digits
 from velatura.stack import RGB, Stack
 from velatura.stack.schema import Parameter, Record
@@ -117,6 +117,11 @@ def compared(energy: Any, alpha: float | None) -> Array:
     """An energy, in CIE 1976 L*a*b* over 100, and a roughness, as a search compares them; None where not asked for."""
     parts = [] if energy is None else [lab(np.broadcast_to(np.array(energy, float), 3)) / 100]
     return np.concatenate([*parts, [] if alpha is None else [BLURS * alpha]])
+
+
+def reflected(seen: StackLobes | MixtureLobes) -> Array:
+    """All that is reflected, (C, N)."""
+    return np.asarray(sum(seen.energy, seen.remainder))
 
 
 def colour(energy: Array) -> Any:

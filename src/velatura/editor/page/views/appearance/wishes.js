@@ -15,6 +15,7 @@ const TITLES = {
   passed: 'Passes',
   body: 'Base, seen from outside',
   film: 'Film, by its thickness',
+  mixture: 'Mixture, by its weights',
 };
 const STEEPEST = { low: 0, high: 89, strict: false };
 const SHARE = { low: 0, high: 1, strict: false };
