@@ -9,6 +9,7 @@ from __future__ import annotations
 import io
 import json
 from collections.abc import Callable, Iterator
+from pathlib import Path
 from typing import Any
 
 import chromium
@@ -174,3 +175,61 @@ def test_a_file_of_the_folder_is_opened_with_its_image_and_one_is_mixed_in(visit
     page.page.keyboard.press("Enter")
     page.page.wait_for_function("(name) => velatura.store.get().name === name", arg=vt.preset("coated-lens").name)
     assert sorted(file.name for file in served.folder.iterdir()) == ["gilt.xml", "wood.png"]
+
+
+# Out -----------------------------------------------------------------------------------------------------------------
+
+
+def test_an_export_shows_its_loss_and_what_the_program_has_of_the_material(visit: Open) -> None:
+    """Expected: the loss of the facts; B is not the material itself, though the file holds that, too."""
+    page = visit()
+    button(page, "Export").click()
+    dialog, format = page.page.locator("dialog.export"), page.page.get_by_label("Format", exact=True)
+    format.select_option("gltf")
+    dialog.locator(".loss").wait_for()
+    made = vt.export("coated-gold", "gltf")
+    variations = [each["variation"] for each in made.facts["loss"]]
+    assert f"{100 * np.mean(variations):.1f} % of the light goes elsewhere" in dialog.locator(".loss").inner_text()
+    assert dialog.locator(".lost li").all_inner_texts() == list(made.facts["left_out"])
+    with page.page.expect_download() as download:
+        dialog.get_by_role("button", name="Download the facts").click()
+    assert download.value.suggested_filename == "coated-brushed-gold.gltf.json"
+    facts = json.loads(Path(download.value.path()).read_text())
+    assert (facts["format"], facts["file"]) == ("gltf", "coated-brushed-gold.gltf")
+
+    button(page, "Compare").click()
+    said(page, "B is what glTF 2.0 has of the material")
+    assert page.state("view.mode") == "split"
+    back = page.state("view.other.material")
+    assert back["layers"][-1]["interface"].get("conductor") is None
+    page.settled()
+
+
+def test_options_of_the_command_line_are_controls_of_the_formats_that_take_them(visit: Open) -> None:
+    page = visit(REFUSED)
+    page.page.get_by_label("Model", exact=True).select_option("belcour2018")
+    button(page, "Export").click()
+    dialog, format = page.page.locator("dialog.export"), page.page.get_by_label("Format", exact=True)
+    text = dialog.locator("textarea")
+    format.select_option("openpbr")
+    text.wait_for()
+    assert dialog.locator(".options").count() == 0
+    format.select_option("hlsl")
+    text.wait_for()
+    dialog.get_by_label("Prefix").fill("gold")
+    dialog.get_by_label("Prefix").press("Enter")
+    dialog.get_by_label("Fixed values").check()
+    dialog.get_by_label("Half floats").check()
+    dialog.get_by_label("First binding").fill("3")
+    dialog.get_by_label("First binding").press("Enter")
+    page.page.wait_for_function("() => document.querySelector('dialog.export textarea')?.value.includes('t3')")
+    options = {"prefix": "gold", "constant": ["all"], "half": True, "binding": 3}
+    assert text.input_value() == vt.export("coated-gold", "hlsl", "belcour2018", **options).text
+    dialog.get_by_label("Shared tables").check()
+    with page.page.expect_download() as download:
+        dialog.get_by_role("button", name="Download velatura.tables.bin").click()
+    shared = vt.export("coated-gold", "hlsl", "belcour2018", tables="velatura.tables.bin", **options).apart
+    assert [Path(download.value.path()).read_bytes()] == list(shared.values())
+    dialog.get_by_label("Prefix").fill("no name")
+    dialog.get_by_label("Prefix").press("Enter")
+    dialog.locator(".problem").get_by_text("prefix").wait_for()

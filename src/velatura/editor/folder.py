@@ -17,6 +17,7 @@ from velatura import imports
 from velatura.editor.messages import TEXT, Answer, Body, Verb, admitting, document, field, to_write
 from velatura.errors import InvalidInput
 from velatura.files import reason, whole
+from velatura.programs import embedded
 from velatura.stack import dumps, load
 from velatura.stack.paths import beside, is_of_presets, rewritten
 
@@ -77,10 +78,12 @@ class Folder:
         """The material of a file of another program, in the folder or in `data`, and what is `left` of it.
 
         Images that the file holds are written into the folder. Where it has several materials, and `name` is none of
-        them, the answer is their `names`.
+        them, the answer is their `names`. Of `bare` data the parameters are read also where a bake holds its material.
         """
         name = field(body, "file", str)
         data = None if body.get("data") is None else _decoded(body)
+        if data is not None and body.get("bare"):
+            data = embedded.loosened(data)
         with self._placed(name, data) as path:
             names = [] if body.get("name") else imports.choice(path)
             if names:

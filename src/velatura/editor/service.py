@@ -15,8 +15,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 from pydantic.fields import FieldInfo
 
-from velatura import exports, kernel
-from velatura.editor import appearance, class_maps, films, truth, validations, wishes
+from velatura import kernel
+from velatura.editor import appearance, class_maps, exporting, films, truth, validations, wishes
 from velatura.editor.messages import (
     Answer,
     Body,
@@ -120,11 +120,7 @@ def _constants() -> Answer:
         "layers": {name: _layer(layer) for name, layer in LAYERS.items()},
         "models": [_model(model) for model in MODELS],
         "default_model": DEFAULT,
-        "formats": [
-            {"name": name, "fixed": "constant" in format.options}
-            for name, format in exports.FORMATS.items()
-            if format.is_text
-        ],
+        "formats": exporting.formats(),
         "names": _names(),
         "objects": list(OBJECTS),
         "environments": [{"name": name, "title": _titled(name), "url": url} for name, url in environments],
@@ -300,19 +296,6 @@ def environment(body: Body) -> Answer:
     return {"picture": array(ENVIRONMENTS[name]())}
 
 
-def export(body: Body) -> Answer:
-    """A material for other programs: the text, what lies beside it by ending, the first ending of the text, and what
-    calls of its functions cost.
-
-    Values are worked in where they are `fixed` and the format allows that.
-    """
-    to = field(body, "to", str)
-    constant = ["all"] if body.get("fixed") and to in exports.taking("constant") else []
-    made = exports.export(material_of(body), to, model_of(body), constant=constant, folder=Path.cwd())
-    beside = {ending: array(np.frombuffer(data, np.uint8), "uint8") for ending, data in made.beside.items()}
-    return {"text": made.text, "beside": beside, "ending": exports.FORMATS[to].endings[0], "costs": made.costs}
-
-
 _VERBS: dict[str, Verb] = {
     "session": session,
     "shader": shader,
@@ -323,7 +306,7 @@ _VERBS: dict[str, Verb] = {
     "write": write,
     "object": object_,
     "environment": environment,
-    "export": export,
+    **exporting.VERBS,
     **films.VERBS,
     **validations.VERBS,
     **appearance.VERBS,

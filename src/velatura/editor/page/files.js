@@ -106,8 +106,14 @@ export function createFiles({ store, session, call, lacks, storage, messages, ad
         const { text, ending = 'yaml' } = await call('write', { material: documentOf(store.get()) });
         offer(new Blob([text], { type: `application/${ending}` }), files.nameOf(ending));
       }),
-    /** Hands what was written of the material to the browser, as a file with an ending. */
-    give: (content, ending) => offer(new Blob([content]), files.nameOf(ending)),
+    /** Hands what was written of the material to the browser, as a file with an ending, or with a name. */
+    give: (content, ending) => files.giveAs(content, files.nameOf(ending)),
+    giveAs: (content, name) => offer(new Blob([content]), name),
+    /** The material that a program has of a text that was written for it: the stack nearest to its parameters. */
+    async readBack(text, ending) {
+      const data = await base64(new Blob([text]));
+      return (await call('import', { file: `material.${ending}`, data, bare: true })).material;
+    },
     copy: (text) =>
       messages.attempt('copy', async () => {
         await toClipboard(text);

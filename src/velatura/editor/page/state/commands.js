@@ -319,12 +319,15 @@ export const setView = titled('change the view', (state, changes) => ({
   view: { ...state.view, ...changes },
 }));
 
-/** Keeps the material, as its model has it, to compare what it becomes with: a slot B. */
-export const pin = titled('pin the material', (state) => {
-  const { name, model, switches, view } = state;
-  const other = { material: documentOf(state), model, switches, title: `B: ${name || 'pinned'}` };
+/** Puts a material beside the open one: into slot B, as the model of the open one has it. */
+export const compareWith = titled('compare with another material', (state, material, name) => {
+  const { model, switches, view } = state;
+  const other = { material, model, switches, title: `B: ${name}` };
   return { ...state, view: { ...view, mode: isPaired(view) ? view.mode : 'split', other } };
 });
+
+/** Keeps the material, to compare what it becomes with. */
+export const pin = titled('pin the material', (state) => compareWith(state, documentOf(state), state.name || 'pinned'));
 
 /** The pinned material in the place of the open one, which is pinned. */
 export const swap = titled('swap A and B', (state) => {

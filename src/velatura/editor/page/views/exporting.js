@@ -3,8 +3,9 @@
 import { html, nothing } from 'lit-html';
 import { createRef, ref } from 'lit-html/directives/ref.js';
 import { decode } from '../arrays.js';
+import { compareWith } from '../state/commands.js';
 import { documentOf } from '../state/material.js';
-import { flag, menu } from './controls.js';
+import { flag, menu, numberField } from './controls.js';
 
 /** Formats by what they are for, those that artists want first. */
 const GROUPS = {
@@ -31,11 +32,33 @@ const GROUPS = {
 };
 const TITLES = Object.assign({}, ...Object.values(GROUPS));
 
+/** Options of the command line that are switches. */
+const SWITCHES = {
+  constant: ['fixed', 'Fixed values', 'Values are worked in, and cannot change later; the code is shorter'],
+  baked: ['baked', 'Baked lobes', 'Lobes over direction are read from a texture; of materials without textures'],
+  half: ['half', 'Half floats', 'Textures have halves of floats'],
+  tables: ['tables', 'Shared tables', 'All tables in one file, which several materials share'],
+};
+const NUMBERS = { group: 'Group of textures', binding: 'First binding' };
+const WHOLE = { low: 0, high: 65536, default: 0 };
+
 /** `view()`, and `show()`, which opens it. */
 export function createExports({ store, session, call, lacks, files, messages, update }) {
   const dialog = createRef();
-  const asked = { to: session.formats.find(({ name }) => !lacks(name)).name, fixed: false };
+  const asked = { to: session.formats.find(({ name }) => !lacks(name)).name };
   let made = null; // the answer of call("export")
+
+  const format = () => session.formats.find(({ name }) => name === asked.to);
+  const takes = (option) => !lacks('options') && format().options.includes(option);
+
+  /** The body of call("export"): of the options those that the format takes. */
+  function question() {
+    const { model, switches } = store.get();
+    const keys = [...Object.entries(SWITCHES).map(([option, [key]]) => [option, key]), ...['prefix', 'group', 'binding'].map((key) => [key, key])];
+    const chosen = keys.filter(([option, key]) => takes(option) && asked[key]).map(([, key]) => [key, asked[key]]);
+    const file = files.nameOf(format().ending.slice(1));
+    return { to: asked.to, ...Object.fromEntries(chosen), file, material: documentOf(store.get()), model, switches };
+  }
 
   const show = () => {
     dialog.value.showModal();
@@ -46,18 +69,24 @@ export function createExports({ store, session, call, lacks, files, messages, up
     Object.assign(asked, changes);
     made = null;
     update();
-    const { model, switches } = store.get();
-    const question = { ...asked, material: documentOf(store.get()), model, switches };
+    const given = question(), text = JSON.stringify(given);
     await messages.attempt('export', async () => {
-      const answer = await call('export', question);
-      if (question.to === asked.to && question.fixed === asked.fixed) made = answer;
+      const answer = await call('export', given);
+      if (text === JSON.stringify(question())) made = answer;
     });
     update();
   }
 
+  /** Puts what a program has of the material beside it: the stack nearest to what was fitted. */
+  const compare = () =>
+    messages.attempt('export', async () => {
+      store.run(compareWith, await files.readBack(made.text, made.ending.slice(1)), TITLES[asked.to]);
+      dialog.value.close();
+      messages.say(`B is what ${TITLES[asked.to]} has of the material, as the nearest stack.`);
+    });
+
   function view() {
     const problem = messages.problems.find(({ about }) => about === 'export');
-    const { fixed } = session.formats.find(({ name }) => name === asked.to);
     const known = session.formats.map(({ name }) => name);
     const option = (name) => [name, TITLES[name] ?? name, lacks(name)];
     const offered = (titles) => Object.keys(titles).filter((name) => known.includes(name)).map(option);
@@ -66,29 +95,44 @@ export function createExports({ store, session, call, lacks, files, messages, up
     return html`<dialog class="export" aria-label="Export" ${ref(dialog)}>
       <div class="head">
         ${menu({ label: 'Format', value: asked.to, options, choose: (to) => write({ to }) })}
-        ${
-          fixed && !lacks('fixed')
-            ? flag({
-                label: 'Fixed values',
-                value: asked.fixed,
-                title: 'Values are worked in, and cannot change later; the code is shorter',
-                choose: (on) => write({ fixed: on }),
-              })
-            : nothing
-        }
         <span class="rest"></span>
         <button type="button" @click=${() => dialog.value.close()}>Close</button>
       </div>
-      ${problem ? html`<p class="problem">${problem.text}</p>` : nothing}
+      ${choices()} ${problem ? html`<p class="problem">${problem.text}</p>` : nothing}
       ${made ? content(made) : problem ? nothing : html`<p>Writing ...</p>`}
     </dialog>`;
   }
 
-  function content({ text, ending, beside, costs }) {
-    const file = (size, name, data) =>
-      html`<button type="button" @click=${() => files.give(data, name.slice(1))}>Download ${name} (${bytes(size)})</button>`;
-    const others = Object.entries(beside).map(([name, array]) => [name, decode(array).array]);
-    return html`<p>${text.split('\n').length} lines</p>
+  /** Controls of the options that the format takes. */
+  function choices() {
+    const shown = Object.entries(SWITCHES).filter(([option]) => takes(option));
+    const numbers = Object.entries(NUMBERS).filter(([option]) => takes(option));
+    if (!shown.length && !takes('prefix')) return nothing;
+    const edit = (key) => {
+      const put = (value) => write({ [key]: value });
+      return { move: put, set: put, settle() {}, refuse: (text) => messages.complain('export', text, { passing: true }) };
+    };
+    return html`<div class="options">
+      ${shown.map(([, [key, label, title]]) => flag({ label, title, value: asked[key] ?? false, choose: (on) => write({ [key]: on }) }))}
+      ${
+        takes('prefix')
+          ? html`<label title="Begins all names in the code">
+              Prefix
+              <input type="text" size="8" placeholder="vt" spellcheck="false" .value=${asked.prefix ?? ''} @change=${({ target }) => write({ prefix: target.value.trim() })} />
+            </label>`
+          : nothing
+      }
+      ${numbers.map(([key, label]) => html`<label>${label} ${numberField({ label, value: asked[key] ?? 0, spec: WHOLE, step: 1, edit: edit(key) })}</label>`)}
+    </div>`;
+  }
+
+  function content({ text, ending, beside, apart = {}, costs, loss = [], left = [], notes = [], facts = '' }) {
+    const button = (title, size, act) => html`<button type="button" @click=${act}>Download ${title} (${bytes(size)})</button>`;
+    const file = (size, name, data) => button(name, size, () => files.give(data, name.slice(1)));
+    const arrays = (given) => Object.entries(given).map(([name, array]) => [name, decode(array).array]);
+    return html`${lost(loss, left)}
+      ${notes.map((note) => html`<p>${note}</p>`)}
+      <p>${text.split('\n').length} lines</p>
       ${
         Object.keys(costs).length
           ? html`<table class="costs" aria-label="What a call costs">
@@ -98,13 +142,29 @@ export function createExports({ store, session, call, lacks, files, messages, up
       }
       <textarea readonly spellcheck="false" aria-label="What is written" .value=${text}></textarea>
       <div class="actions">
-        ${file(new Blob([text]).size, ending, text)}
-        ${others.map(([name, data]) => file(data.byteLength, name, data))}
+        ${file(new Blob([text]).size, ending, text)} ${arrays(beside).map(([name, data]) => file(data.byteLength, name, data))}
+        ${arrays(apart).map(([name, data]) => button(name, data.byteLength, () => files.giveAs(data, name)))}
+        ${facts ? button('the facts', new Blob([facts]).size, () => files.give(facts, `${ending.slice(1)}.json`)) : nothing}
         <button type="button" @click=${() => files.copy(text)}>Copy the text</button>
+        ${facts ? html`<button type="button" title="What a program needs to know to use the file" @click=${() => files.copy(facts)}>Copy the facts</button>` : nothing}
+        ${format().read && !lacks('import') ? html`<button type="button" title="What is written, read back, in slot B" @click=${compare}>Compare</button>` : nothing}
       </div>`;
   }
 
   return { view, show };
+}
+
+/** What is lost of the light, as a number and a line, and what is not held at all. */
+function lost(loss, left) {
+  if (!loss.length) return nothing;
+  const variations = loss.map(({ variation }) => variation), mean = variations.reduce((a, b) => a + b) / loss.length;
+  const percent = (share) => `${(100 * share).toFixed(1)} %`;
+  const most = Math.max(...loss.map(({ albedo }) => albedo)).toFixed(3);
+  const angles = loss.map(({ cosine, variation }) => `cosine ${cosine}: ${percent(variation)}`).join(', ');
+  return html`<p class="loss" title=${`Total variation by the cosine of incidence: ${angles}`}>
+      <b>${percent(mean)}</b> of the light goes elsewhere (${percent(Math.max(...variations))} at most); albedo up to ${most} off
+    </p>
+    ${left.length ? html`<ul class="lost" aria-label="Not held">${left.map((line) => html`<li>${line}</li>`)}</ul>` : nothing}`;
 }
 
 /** A size in words. */
