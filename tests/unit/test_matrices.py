@@ -48,3 +48,10 @@ def test_products_with_nothing_stay_of_blocks() -> None:
     nothing = Blocks.diagonal(np.zeros((1, 1, ROWS)))
     a = drawn("dense", np.random.default_rng(6))
     assert matrices.product(a, nothing) is nothing and matrices.product(nothing, a) is nothing
+
+
+@pytest.mark.parametrize(("rows", "inner", "columns"), [(90, 90, 90), (1, 180, 1500), (180, 180, 7)])
+def test_large_products_are_those_of_their_blocks(rows: int, inner: int, columns: int) -> None:
+    rng = np.random.default_rng(7)
+    first, second = rng.normal(size=(3, 1, rows, inner)), rng.normal(size=(1, 1, inner, columns))
+    assert matrices.applied(first, second) == pytest.approx(first @ second, abs=1e-12)

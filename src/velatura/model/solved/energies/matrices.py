@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 Array = NDArray[np.floating]
 
 ALONE = 2**18  # multiplications that OpenBLAS leaves to one thread
+ROWS = 40  # of a block of larger products, about as many as columns
 LARGE = 100  # rows of a matrix of which it shares the inverse among threads
 
 
@@ -125,12 +126,18 @@ def repeated(matrix: Matrix, lost: float) -> Matrix:
 
 
 def _dense(matrix: Array, columns: Array) -> Array:
-    """Block by block of columns: larger products BLAS would share among threads, which wait for a busy machine."""
-    width = max(ALONE // matrix[0, 0].size, 1)
-    count = columns.shape[-1]
-    if count <= width:
+    """Block by block: larger products BLAS would share among threads, which wait for a busy machine."""
+    count, width = matrix.shape[-2], columns.shape[-1]
+    if count * width * matrix.shape[-1] <= ALONE:
         return np.asarray(matrix @ columns)
-    return np.concatenate([matrix @ columns[..., k : k + width] for k in range(0, count, width)], axis=-1)
+    rows = min(ROWS, count)
+    across = max(ALONE // (rows * matrix.shape[-1]), 1)
+    found = np.empty((*np.broadcast_shapes(matrix.shape[:-2], columns.shape[:-2]), count, width))
+    for i in range(0, count, rows):
+        for k in range(0, width, across):
+            place = found[..., i : i + rows, k : k + across]
+            np.matmul(matrix[..., i : i + rows, :], columns[..., k : k + across], out=place)
+    return found
 
 
 def _inverse(matrix: Array) -> Array:
