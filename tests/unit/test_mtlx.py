@@ -62,15 +62,15 @@ def test_all_generators_make_code_of_layers_with_textures(
     assert [node.getInputValue("file") for node in images] == [] if "brushing" in varies else [image] * len(images)
 
 
-@pytest.mark.parametrize(("preset", "lost", "off"), [("frosted-metal", 0.01, 0.01), ("turned-brushing", 0.015, 0.1)])
-def test_polynomials_are_the_columns_that_they_stand_for(preset: str, lost: float, off: float) -> None:
-    """Weights and roughness within .01, but those of brushed lobes, which change fast at some azimuths."""
+@pytest.mark.parametrize(("preset", "off"), [("frosted-metal", 0.01), ("turned-brushing", 0.1)])
+def test_polynomials_are_the_columns_that_they_stand_for(preset: str, off: float) -> None:
+    """Weights within .01; roughness too, but of brushed lobes, which changes fast at some azimuths."""
     baked = tabulated(Material.of(vt.preset(preset)), named("velatura"))
     cosine, phi = np.meshgrid(np.linspace(0.2, 0.98, 9), np.linspace(0, 3, 7), indexing="ij")
     sine = np.sqrt(1 - cosine**2)
     wi = tuple(x.ravel() for x in (sine * np.cos(phi), sine * np.sin(phi), cosine))
     for a, b in zip(PolynomialFit(baked).above(wi), baked.above(wi)):
-        np.testing.assert_allclose(a.weight, b.weight, atol=lost)
+        np.testing.assert_allclose(a.weight, b.weight, atol=0.01)
         np.testing.assert_allclose(np.sort(a.roughness[:2], 0), np.sort(b.roughness[:2], 0), atol=off)
 
 

@@ -11,8 +11,8 @@ from velatura.optics.ggx import Direction
 from velatura.renderer import directional_grid
 from velatura.shader.closures import Closure, ColumnReader, TabulatedClosures, bounded
 
-DEGREE = 8
-MODES = 5  # of azimuth: a constant, cosines and sines of 2 and 4 times the angle
+MODES = 7  # of azimuth where lobes are brushed: a constant, cosines and sines of 2, 4 and 6 times the angle
+DEGREES = {1: 8, MODES: 6}  # of the root of the cosine, by the number of modes
 NEGLIGIBLE = 3e-4  # of a weight or a roughness, over directions
 SINE2_MIN = 1e-6  # squared sine of a direction that has an azimuth
 
@@ -22,19 +22,19 @@ Array = NDArray[np.floating]
 class PolynomialFit:
     """The columns of closures as polynomials: coefficients (modes, degrees, columns).
 
-    Modes are 1, and cosine and sine of 2 and 4 times the azimuth where lobes are brushed.
+    Modes are 1, and cosine and sine of 2, 4 and 6 times the azimuth where lobes are brushed.
     """
 
     def __init__(self, baked: TabulatedClosures) -> None:
         self.baked = baked
         self.modes = MODES if len(baked.shape) > 1 else 1
         x, y, z = (np.ravel(w) for w in directional_grid.directions(baked.shape, None))
-        powers = np.sqrt(z) ** np.arange(DEGREE + 1)[:, None]
+        powers = np.sqrt(z) ** np.arange(DEGREES[self.modes] + 1)[:, None]
         basis = (np.stack(np.broadcast_arrays(*_modes((x, y, z), self.modes)))[:, None] * powers).reshape(-1, len(z))
         weight = np.sqrt(z)  # as many nodes are at grazing directions, where little light is
         rows = baked.rows[0]
         fitted = np.linalg.lstsq((basis * weight).T, rows * weight[:, None], rcond=None)[0]
-        self.coefficients = fitted.reshape(self.modes, DEGREE + 1, -1)
+        self.coefficients = fitted.reshape(self.modes, len(powers), -1)
 
     def above(self, wi: Direction) -> list[Closure]:
         """The closures for light from above, in any dialect; weights that are negative by the errors of fits are 0."""
@@ -65,10 +65,11 @@ class PolynomialFit:
 
 
 def _modes(w: Direction, count: int) -> list[Value]:
-    """1, and cosine and sine of twice the azimuth, and of four times: as many as there are."""
+    """1, and cosine and sine of two, four and six times the azimuth: as many as there are."""
     if count == 1:
         return [1.0]
     u, v, _ = w
     length = ops.maximum(u * u + v * v, SINE2_MIN)
     c, s = (u * u - v * v) / length, 2 * u * v / length
-    return [1.0, c, s, c * c - s * s, 2 * c * s]
+    c_4, s_4 = c * c - s * s, 2 * c * s
+    return [1.0, c, s, c_4, s_4, c_4 * c - s_4 * s, s_4 * c + c_4 * s]
