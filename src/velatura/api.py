@@ -15,9 +15,11 @@ from velatura.stack import MaterialLike, dumps, load
 from velatura.stack.schema import unknown
 
 if TYPE_CHECKING:
-    from numpy.typing import ArrayLike
+    import numpy as np
+    from numpy.typing import ArrayLike, NDArray
 
     from velatura.checks import Report
+    from velatura.kernel import BSDF
 
 __all__ = ["bsdf", "check", "lobes", "register", "render"]
 
@@ -80,7 +82,7 @@ def lobes(
     return material_lobes(load(stack), cos_theta, phi, model, **switches)
 
 
-def bsdf(stack: MaterialLike, model: str | Model = DEFAULT, **switches: Any) -> Any:
+def bsdf(stack: MaterialLike, model: str | Model = DEFAULT, **switches: Any) -> BSDF:
     """A `mi.BSDF` of a material, in the variant that is set (else llvm_ad_rgb).
 
     Args:
@@ -107,7 +109,8 @@ def bsdf(stack: MaterialLike, model: str | Model = DEFAULT, **switches: Any) -> 
         options |= exact
     kernel.mitsuba()
     register()
-    return kernel.load_dict({**options, "material": dumps(described, "json")})
+    made: BSDF = kernel.load_dict({**options, "material": dumps(described, "json")})
+    return made
 
 
 def render(
@@ -120,7 +123,7 @@ def render(
     seed: int = 0,
     progress: Callable[[int, int], None] | None = None,
     **switches: str,
-) -> Any:
+) -> NDArray[np.float32]:
     """A picture of a material (a stack, a mixture, a file, or a preset's name): linear RGB of shape (height, width, 3).
 
     Args:
@@ -142,12 +145,12 @@ def render(
 
 
 def check(
-    material: Any,
+    material: BSDF | MaterialLike,
     model: str | Model = DEFAULT,
     *,
     exceptions: Collection[str] = (),
     lossless: bool = False,
-    expected: Any = None,
+    expected: BSDF | MaterialLike | None = None,
     plots: str | Path | None = None,
     progress: Callable[[int, int], None] | None = None,
     **switches: str,

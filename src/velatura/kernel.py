@@ -24,10 +24,13 @@ import traceback
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from types import ModuleType
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 from velatura import pictures
 from velatura.errors import InvalidInput, MissingTool, VelaturaError
+
+if TYPE_CHECKING:
+    from mitsuba import BSDF as BSDF
 
 Factory = Callable[[ModuleType], type]
 

@@ -23,9 +23,9 @@ OF_DEFAULT = {
     "stack/layers.py": [
         ("    films: tuple[FilmValues, ...] = ()\n", "    films: tuple[FilmValues, ...] = ()\n    dust: Any = 0.0\n"),
         (
-            '    films: Annotated[tuple[Film, ...], Films("thin films on it, from the top")] = ()\n',
+            "    films: Annotated[Taken[",
             '    dust: Annotated[float | Texture, Scalar("share of the reflected light", low=0, high=1)] = 0.0\n'
-            '    films: Annotated[tuple[Film, ...], Films("thin films on it, from the top")] = ()\n',
+            "    films: Annotated[Taken[",
         ),
     ],
     "model/rough_interface.py": [

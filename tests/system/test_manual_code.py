@@ -13,7 +13,6 @@ import inspect
 import re
 import runpy
 import shlex
-import textwrap
 import warnings
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
@@ -25,6 +24,7 @@ import numpy as np
 import pytest
 import typer
 import yaml
+from manual import BLOCK, PAGES, ROOT, blocks, written
 
 import velatura as vt
 from velatura import api, comparison, figures, inverse, sweeps
@@ -39,9 +39,6 @@ from velatura.shader import closures
 from velatura.sweeps import run as sweeping
 
 Run = Callable[..., tuple[int, str, str]]
-ROOT = Path(__file__).parents[2]
-PAGES = ["README.md", *sorted(str(path.relative_to(ROOT)) for path in (ROOT / "docs").rglob("*.md"))]
-BLOCK = re.compile(r"^( *)(?:```|~~~)([\w{}-]*)[^\n]*\n(.*?)^ *(?:```|~~~)$", re.MULTILINE | re.DOTALL)
 COMMAND = re.compile(r"^(velatura|make|pip|python) ", re.MULTILINE)
 
 SCRIPTS = sorted((ROOT / "docs" / "examples").glob("*.py"))
@@ -73,12 +70,6 @@ RUN_ELSEWHERE = {
 }
 
 
-def blocks(page: str) -> list[tuple[str, str]]:
-    """The fenced blocks of a page: language, text."""
-    found = BLOCK.findall((ROOT / page).read_text(encoding="utf-8"))
-    return [(language, textwrap.dedent(text)) for _, language, text in found if not language.startswith("{")]
-
-
 def commands(text: str) -> list[list[str]]:
     """The words of each command of a block."""
     lines = text.replace("\\\n", " ").splitlines()
@@ -86,11 +77,6 @@ def commands(text: str) -> list[list[str]]:
 
 
 # Files that pages take for granted
-
-
-def written(page: str, language: str) -> list[str]:
-    """The texts of a language on a page."""
-    return [text for found, text in blocks(page) if found == language]
 
 
 def material(folder: Path, name: str = "coated-gold.yaml") -> None:

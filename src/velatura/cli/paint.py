@@ -75,7 +75,7 @@ def _wish(colour: str | None, reflectance: str | None) -> Sequence[float] | Spec
     if reflectance is not None:
         from velatura.stack import Spectrum
 
-        return Spectrum(spectrum=reflectance)  # type: ignore[arg-type]
+        return Spectrum(spectrum=reflectance)
     assert colour is not None
     if re.fullmatch("#[0-9a-fA-F]{6}", colour):
         import numpy as np

@@ -35,8 +35,8 @@ FIGURES = (
 class Figure(Protocol):
     """The interface of a figure."""
 
-    def compute(self, *, progress: Progress | None = None) -> dict[str, Any]:
-        """The numbers; `progress` is called with (steps done, all steps).
+    def compute(self, *, progress: Progress | None = None, **options: Any) -> dict[str, Any]:
+        """The numbers; `progress` is called with (steps done, all steps), `options` are the figure's own.
 
         Raises:
             InvalidInput, MissingTool: as `vt.render`, where there are pictures, or as `reference.statistics`.

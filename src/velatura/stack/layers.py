@@ -7,7 +7,7 @@ it is to its neighbours. Files, flat names, `--set`, plugins, textures, schema a
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Collection, Mapping
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Annotated, Any, ClassVar, Literal, TypeAlias
 
@@ -16,7 +16,7 @@ from pydantic import model_validator
 from velatura.errors import within
 from velatura.stack.phases import Phase, PhaseRecord, WrittenPhase, asymmetry
 from velatura.stack.pigments import Pigment, Pigments, coefficients
-from velatura.stack.schema import Parameter, Record, parameters
+from velatura.stack.schema import Parameter, Record, Taken, by_default, parameters
 from velatura.stack.spectra import MIRROR, Measured, MeasuredIndex, Named, names
 from velatura.stack.values import (
     INDEX_HIGH,
@@ -25,15 +25,22 @@ from velatura.stack.values import (
     Angle,
     Brushing,
     Colour,
+    ColourLike,
+    ColourValue,
     Conductor,
     Film,
     Films,
     Index,
+    IndexLike,
+    IndexValue,
+    NumbersLike,
     Pair,
     Scalar,
+    ScalarLike,
     Spectrum,
     Substance,
     Texture,
+    Written,
 )
 
 Kind: TypeAlias = Literal["dielectric", "conductor", "mirror", "medium", "diffuse"]
@@ -234,13 +241,13 @@ class Interface(LayerRecord):
     title = "interface"
 
     eta: Annotated[
-        float | RGB | str | Spectrum | Substance | Texture | None,
+        Taken[IndexLike | None, IndexValue | None],
         Index(
             "absolute index of refraction of the medium below", low=INDEX_LOW, high=INDEX_HIGH, part="eta", typical=1.5
         ),
-    ] = None
+    ] = by_default(None)
     k: Annotated[
-        float | RGB | str | Spectrum | Substance | Texture | None,
+        Taken[IndexLike | None, IndexValue | None],
         Index(
             "absolute extinction of what lies below; written, even as 0, it makes it opaque",
             low=0,
@@ -248,20 +255,24 @@ class Interface(LayerRecord):
             part="k",
             typical=1.0,
         ),
-    ] = None
+    ] = by_default(None)
     conductor: Annotated[
         str | None,
         Conductor("a metal by name, in place of eta and k; `mirror` reflects all light"),
     ] = None
     alpha: Annotated[
-        float | Texture | tuple[float | Texture, float | Texture],
+        Taken[
+            ScalarLike | NumbersLike | Sequence[ScalarLike], float | Texture | tuple[float | Texture, float | Texture]
+        ],
         Pair("GGX roughness along the tangent and the bitangent", low=0, high=1, typical=0.1),
-    ] = 0.0
+    ] = by_default(0.0)
     rotation: Annotated[
-        float | Texture | Brushing,
+        Taken[ScalarLike | Brushing, float | Texture | Brushing],
         Angle("turn of the tangent, anticlockwise seen from outside, from dp/du", unit="degrees"),
-    ] = 0.0
-    films: Annotated[tuple[Film, ...], Films("thin films on it, from the top")] = ()
+    ] = by_default(0.0)
+    films: Annotated[Taken[Sequence[Film | Written], tuple[Film, ...]], Films("thin films on it, from the top")] = (
+        by_default(())
+    )
 
     @model_validator(mode="after")
     def _one_way_to_say_it(self) -> Interface:
@@ -322,15 +333,25 @@ class Medium(LayerRecord):
     title = "medium"
     fresh: ClassVar[Mapping[str, Any]] = {"sigma_a": (0.1, 0.2, 0.4)}
 
-    depth: Annotated[float | Texture, Scalar("thickness, in the unit of length of sigma", unit="length", low=0)] = 1.0
-    sigma_a: Annotated[float | RGB | Spectrum | Texture, Colour("absorption coefficient", unit="1/length", low=0)] = 0.0
-    sigma_s: Annotated[float | RGB | Spectrum | Texture, Colour("scattering coefficient", unit="1/length", low=0)] = 0.0
+    depth: Annotated[
+        Taken[ScalarLike, float | Texture], Scalar("thickness, in the unit of length of sigma", unit="length", low=0)
+    ] = by_default(1.0)
+    sigma_a: Annotated[Taken[ColourLike, ColourValue], Colour("absorption coefficient", unit="1/length", low=0)] = (
+        by_default(0.0)
+    )
+    sigma_s: Annotated[Taken[ColourLike, ColourValue], Colour("scattering coefficient", unit="1/length", low=0)] = (
+        by_default(0.0)
+    )
     g: Annotated[
-        float | Texture,
+        Taken[ScalarLike, float | Texture],
         Scalar("mean cosine of the scattering angle (Henyey-Greenstein)", low=-1, high=1, strict=True),
-    ] = 0.0
-    phase: Annotated[str | PhaseRecord | None, Phase("phase function, in place of g")] = None
-    pigments: Annotated[tuple[Pigment, ...], Pigments("pigments, in place of sigma_a and sigma_s")] = ()
+    ] = by_default(0.0)
+    phase: Annotated[
+        Taken[str | PhaseRecord | Written | None, str | PhaseRecord | None], Phase("phase function, in place of g")
+    ] = by_default(None)
+    pigments: Annotated[
+        Taken[Sequence[Pigment | Written], tuple[Pigment, ...]], Pigments("pigments, in place of sigma_a and sigma_s")
+    ] = by_default(())
 
     @model_validator(mode="after")
     def _one_way_to_say_it(self) -> Medium:
@@ -374,7 +395,9 @@ class Diffuse(LayerRecord):
     title = "diffuse base"
     fresh: ClassVar[Mapping[str, Any]] = {"albedo": (0.5, 0.5, 0.5)}
 
-    albedo: Annotated[float | RGB | Spectrum | Texture, Colour("fraction of light reflected", low=0, high=1)] = 0.5
+    albedo: Annotated[Taken[ColourLike, ColourValue], Colour("fraction of light reflected", low=0, high=1)] = (
+        by_default(0.5)
+    )
 
     @property
     def lossless(self) -> bool:

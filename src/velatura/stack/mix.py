@@ -18,15 +18,18 @@ from velatura.stack import cross_section
 from velatura.stack.flat_names import Address
 from velatura.stack.flat_names import addressed as in_a_stack
 from velatura.stack.layers import Value
-from velatura.stack.schema import Parameter, Record, unknown
+from velatura.stack.schema import Parameter, Record, Taken, by_default, unknown
 from velatura.stack.stack import Stack
-from velatura.stack.values import Scalar, Text, Texture
+from velatura.stack.values import Scalar, ScalarLike, Text, Texture, Written
 
 DEEPEST = 4  # mixtures within each other
 MOST = 16  # stacks of a mixture, those of its mixtures included
 ROUNDING = 1e-6  # by which the sum of all weights may differ from 1
 
 WEIGHT = Scalar("share of the surface; the last part has what the others leave", low=0, high=1, typical=0.0)
+
+#: A weight and a material.
+Share: TypeAlias = "tuple[ScalarLike | None, Stack | Mix | str | Path | Written]"
 
 _PART = re.compile(rf"(?!(?:part\d+_){{{DEEPEST + 1}}})part(\d{{1,4}})_(\w+)")  # not deeper than mixtures are
 
@@ -51,8 +54,10 @@ class Part(Record):
 
     holds = "weight and material"
 
-    weight: Annotated[float | Texture | None, WEIGHT] = None
-    material: Annotated[Stack | Mix, MaterialRecord("what covers this share")]
+    weight: Annotated[Taken[ScalarLike | None, float | Texture | None], WEIGHT] = by_default(None)
+    material: Annotated[
+        Taken[Stack | Mix | str | Path | Written, Stack | Mix], MaterialRecord("what covers this share")
+    ]
 
 
 class Parts(Parameter):
@@ -91,7 +96,7 @@ class Mix(Record):
     source: Annotated[str, Text("where the numbers come from", lines=True)] = ""
     mix: Annotated[tuple[Part, ...], Parts("the parts, side by side")]
 
-    def __init__(self, /, mix: Iterable[Part | tuple[Any, Any] | Mapping[str, Any]] = (), **options: Any) -> None:
+    def __init__(self, /, mix: Iterable[Part | Share | Written] = (), **options: Any) -> None:
         super().__init__(mix=mix, **options)
 
     @model_validator(mode="after")

@@ -19,9 +19,9 @@ from pydantic import PrivateAttr, model_validator
 
 from velatura.errors import needs
 from velatura.stack import tables
-from velatura.stack.schema import Parameter, Record, unknown
+from velatura.stack.schema import Parameter, Record, Taken, unknown
 from velatura.stack.tables import Table
-from velatura.stack.values import LARGEST, Rows, number
+from velatura.stack.values import LARGEST, Rows, RowsLike, number
 
 RAYLEIGH = "rayleigh"  # of particles that are far smaller than the wavelength
 
@@ -79,7 +79,7 @@ class PhaseTable(TabulatedPhase):
     holds = "table"
 
     table: Annotated[
-        Path | tuple[tuple[float, float], ...],
+        Taken[str | Path | RowsLike, Path | tuple[tuple[float, float], ...]],
         Rows(
             "value per solid angle, in any unit, over the angle of scattering",
             unit="degrees",

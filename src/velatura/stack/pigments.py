@@ -17,11 +17,24 @@ from pydantic import PrivateAttr, model_validator
 
 from velatura.errors import InvalidInput, within
 from velatura.stack import tables
-from velatura.stack.schema import Parameter, Record
-from velatura.stack.values import LARGEST, MOST_ROWS, RGB, Colour, File, Spectrum, Text, number
+from velatura.stack.schema import Parameter, Record, Taken, by_default
+from velatura.stack.values import (
+    LARGEST,
+    MOST_ROWS,
+    RGB,
+    Colour,
+    File,
+    NumberLike,
+    NumbersLike,
+    Spectrum,
+    Text,
+    Written,
+    number,
+)
 
 #: A coefficient that is the same at all points.
 Coefficient: TypeAlias = float | RGB | Spectrum
+CoefficientLike: TypeAlias = NumberLike | NumbersLike | Spectrum | Written | None
 
 COLUMNS = "wavelength_nm", "K", "S"  # of a file
 
@@ -60,10 +73,15 @@ class Pigment(Record):
 
     name: Annotated[str, Text("name of the pigment")] = ""
     pigment: Annotated[
-        Path | None, File("table of wavelength (nm), K and S, in place of these; relative to the material file")
-    ] = None
-    K: Annotated[Coefficient | None, coefficient("Kubelka and Munk's absorption at a concentration of 1")] = None
-    S: Annotated[Coefficient | None, coefficient("Kubelka and Munk's scattering at a concentration of 1")] = None
+        Taken[str | Path | None, Path | None],
+        File("table of wavelength (nm), K and S, in place of these; relative to the material file"),
+    ] = by_default(None)
+    K: Annotated[
+        Taken[CoefficientLike, Coefficient | None], coefficient("Kubelka and Munk's absorption at a concentration of 1")
+    ] = by_default(None)
+    S: Annotated[
+        Taken[CoefficientLike, Coefficient | None], coefficient("Kubelka and Munk's scattering at a concentration of 1")
+    ] = by_default(None)
     concentration: Annotated[float, number("factor on K and S", low=0, typical=0.1)] = 1.0
     _coefficients: tuple[Coefficient, Coefficient] = PrivateAttr()
 

@@ -13,7 +13,7 @@ import itertools
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, ClassVar, TypeVar
+from typing import TYPE_CHECKING, Any, ClassVar, Generic, TypeVar
 
 from pydantic import BaseModel, ConfigDict, ValidationError
 from pydantic_core import CoreSchema, core_schema
@@ -21,6 +21,8 @@ from pydantic_core import CoreSchema, core_schema
 from velatura.errors import InvalidInput
 
 RecordType = TypeVar("RecordType", bound="Record")
+Given = TypeVar("Given", contravariant=True)
+Kept = TypeVar("Kept", covariant=True)
 
 
 def unknown(what: str, name: object, known: Iterable[str], listed: str = "") -> str:
@@ -86,6 +88,21 @@ class Parameter:
 
     def __get_pydantic_core_schema__(self, source: object, handler: object) -> CoreSchema:
         return core_schema.no_info_plain_validator_function(self.check)
+
+
+class Taken(Generic[Given, Kept]):
+    """The type of a field that is given as one type and kept as another, as type checkers read it."""
+
+    if TYPE_CHECKING:
+
+        def __get__(self, record: object, owner: type | None = None) -> Kept: ...
+
+        def __set__(self, record: object, value: Given) -> None: ...
+
+
+def by_default(value: Any) -> Any:
+    """The default of a `Taken` field, which is not of that type."""
+    return value
 
 
 class Record(BaseModel):

@@ -17,6 +17,7 @@ from velatura.stack.layers import (
     Interface,
     Kind,
     Layer,
+    LayerRecord,
     Medium,
     Value,
     entry_name,
@@ -25,7 +26,7 @@ from velatura.stack.layers import (
 from velatura.stack.phases import WrittenPhase
 from velatura.stack.schema import Record, show, unknown
 from velatura.stack.spectra import MeasuredIndex
-from velatura.stack.values import Flag, Text
+from velatura.stack.values import Flag, Text, Written
 
 
 class Stack(Record):
@@ -47,7 +48,7 @@ class Stack(Record):
     thin: Annotated[bool, Flag("a thin pane: light leaves it into the exterior index")] = False
     layers: tuple[Layer, ...]
 
-    def __init__(self, /, layers: Iterable[Layer | Mapping[str, Any]] = (), **options: Any) -> None:
+    def __init__(self, /, layers: Iterable[LayerRecord | Written] = (), **options: Any) -> None:
         super().__init__(layers=_layers(layers), **options)
 
     @model_validator(mode="after")
@@ -125,7 +126,7 @@ class Stack(Record):
         """Whether light passes: no layer is opaque."""
         return transmits(self.kinds)
 
-    def with_layers(self, layers: Iterable[Layer], name: str | None = None) -> Stack:
+    def with_layers(self, layers: Iterable[LayerRecord], name: str | None = None) -> Stack:
         """Other layers under the same index, by the same name unless given."""
         return Stack(layers, name=self.name if name is None else name, exterior=self.exterior, thin=self.thin)
 

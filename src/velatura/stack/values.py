@@ -8,19 +8,33 @@ import math
 import numbers
 import os
 import re
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, Any, ClassVar, Literal, TypeAlias
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal, TypeAlias
 
 from pydantic import PrivateAttr, model_validator
 
 from velatura.errors import InvalidInput, within
 from velatura.stack import substances
-from velatura.stack.schema import Parameter, Record, parameters, show, unknown
+from velatura.stack.schema import Parameter, Record, Taken, by_default, parameters, show, unknown
 from velatura.stack.spectra import MIRROR, Measured, Named, Table, names, of_rows, read, rgb, source
 
+if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import NDArray
+
 RGB: TypeAlias = tuple[float, float, float]
+
+# Numbers as they are given; float or tuples of it are kept
+if TYPE_CHECKING:
+    NumberLike: TypeAlias = float | np.floating[Any] | np.integer[Any]
+    NumbersLike: TypeAlias = Sequence[NumberLike] | NDArray[np.floating[Any]] | NDArray[np.integer[Any]]
+    RowsLike: TypeAlias = Sequence[NumbersLike] | NDArray[np.floating[Any]] | NDArray[np.integer[Any]]
+else:  # pydantic evaluates annotations, and NumPy is slow to import
+    NumberLike = NumbersLike = RowsLike = Any
+
+Written: TypeAlias = Mapping[str, Any]  # a record as a file holds it
 
 LISTED = "`velatura schema` lists all"
 
@@ -466,7 +480,7 @@ class Spectrum(Record, Measured):
     """
 
     spectrum: Annotated[
-        Path | tuple[tuple[float, float], ...],
+        Taken[str | Path | RowsLike, Path | tuple[tuple[float, float], ...]],
         Rows(
             "table of wavelength (nm) and value; a file is relative to the material file",
             place=number("wavelength", low=0, high=1e5),
@@ -561,7 +575,7 @@ class Texture(Varying):
 
     what: ClassVar[str] = "texture"
 
-    texture: Annotated[Path, File("image file, relative to the material file")]
+    texture: Annotated[Taken[str | Path, Path], File("image file, relative to the material file")]
     channel: Annotated[
         str | None, Choice("channel that is read; rgb for colours, otherwise r", options=("r", "g", "b", "a", "rgb"))
     ] = None
@@ -569,8 +583,9 @@ class Texture(Varying):
     offset: Annotated[float, Scalar("added after the factor", texturable=False, differentiable=False)] = 0.0
     encoding: Annotated[str, Choice("how the texel is stored", options=("linear", "srgb"))] = "linear"
     curve: Annotated[
-        tuple[float, ...] | None, Curve("values for texels from 0 to 1, in equal steps, in place of the texel")
-    ] = None
+        Taken[NumbersLike | None, tuple[float, ...] | None],
+        Curve("values for texels from 0 to 1, in equal steps, in place of the texel"),
+    ] = by_default(None)
 
 
 class Brushing(Varying):
@@ -589,13 +604,23 @@ class Brushing(Varying):
     offset: Annotated[float, Scalar("added to the angle", unit="degrees", texturable=False, differentiable=False)] = 0.0
 
 
+# Values as they are given
+ScalarLike: TypeAlias = NumberLike | Texture | Written
+ColourLike: TypeAlias = NumberLike | NumbersLike | Spectrum | Texture | Written
+IndexLike: TypeAlias = ColourLike | str | Substance
+
+# Values as they are kept
+ColourValue: TypeAlias = float | RGB | Spectrum | Texture
+IndexValue: TypeAlias = ColourValue | str | Substance
+
+
 class Film(Record):
     """A thin film: it changes what its interface reflects, by interference, and nothing else."""
 
     holds = "eta and thickness_nm"
 
     eta: Annotated[
-        float | RGB | str | Spectrum | Substance | Texture,
+        Taken[IndexLike, IndexValue],
         Index(
             "absolute index of refraction",
             low=INDEX_LOW,
@@ -605,15 +630,17 @@ class Film(Record):
         ),
     ]
     k: Annotated[
-        float | RGB | str | Spectrum | Substance | Texture,
+        Taken[IndexLike, IndexValue],
         Index(
             "absolute extinction",
             low=0,
             high=INDEX_HIGH,
             part="k",
         ),
-    ] = 0.0
-    thickness_nm: Annotated[float | Texture, Scalar("thickness", unit="nm", low=0, high=THICKEST_NM, typical=300.0)]
+    ] = by_default(0.0)
+    thickness_nm: Annotated[
+        Taken[ScalarLike, float | Texture], Scalar("thickness", unit="nm", low=0, high=THICKEST_NM, typical=300.0)
+    ]
 
     @property
     def absorbs(self) -> bool:

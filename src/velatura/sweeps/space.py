@@ -9,6 +9,7 @@ import threading
 import warnings
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Annotated, Any
 
 import numpy as np
@@ -17,8 +18,8 @@ from pydantic import model_validator
 
 from velatura.errors import InvalidInput, within
 from velatura.stack import Described, Mix, Stack, addressed, load
-from velatura.stack.schema import Parameter, Record
-from velatura.stack.values import LARGEST, Choice, Flag, Scalar, Whole
+from velatura.stack.schema import Parameter, Record, Taken, by_default
+from velatura.stack.values import LARGEST, Choice, Flag, Scalar, Whole, Written
 
 Array = NDArray[Any]
 
@@ -97,8 +98,12 @@ class Axis(Record):
 
     holds = "values, range or distribution"
 
-    values: Annotated[tuple[Any, ...] | None, Listed("the values")] = None
-    range: Annotated[tuple[float, float] | None, RangeEnds("both ends")] = None
+    values: Annotated[Taken[Sequence[Any] | NDArray[Any] | None, tuple[Any, ...] | None], Listed("the values")] = (
+        by_default(None)
+    )
+    range: Annotated[Taken[Sequence[float] | None, tuple[float, float] | None], RangeEnds("both ends")] = by_default(
+        None
+    )
     steps: Annotated[int | None, Number("values in the range, on a grid", low=2, high=10**6)] = None
     distribution: Annotated[str, Choice("how likely values are", options=("uniform", "log-uniform", "normal"))] = (
         "uniform"
@@ -228,14 +233,14 @@ class Space(Record):
         InvalidInput: in one line that names the key and what is allowed.
     """
 
-    material: Annotated[Stack | Mix, MaterialSource("a material: a file, a preset, or its layers")]
-    vary: Annotated[dict[str, Axis], Axes("flat names, and how each varies")]
+    material: Annotated[
+        Taken[Stack | Mix | str | Path | Written, Stack | Mix],
+        MaterialSource("a material: a file, a preset, or its layers"),
+    ]
+    vary: Annotated[Taken[Mapping[str, Axis | Written], dict[str, Axis]], Axes("flat names, and how each varies")]
     sampling: Annotated[str, Choice("how points are chosen", options=("grid", "random", "sobol"))] = "grid"
     count: Annotated[int | None, Number("points, of random and sobol", low=1)] = None
     seed: Annotated[int, Number("of points, and of the random numbers at each", high=2**63 - 1)] = 0
-
-    def __init__(self, /, **fields: Any) -> None:
-        super().__init__(**fields)  # materials and axes in any form
 
     @model_validator(mode="after")
     def _fits_together(self) -> Space:

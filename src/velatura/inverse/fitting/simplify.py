@@ -19,7 +19,7 @@ from velatura.inverse.fitting.angles import Directions, ReflectanceTable
 from velatura.inverse.fitting.descent import Descent, End, Fit, descended, fit
 from velatura.inverse.invert import alternatives, model_of
 from velatura.inverse.lobes.partial_stack import written
-from velatura.inverse.lobes.target import Target, read
+from velatura.inverse.lobes.target import Target, TargetLike, read
 from velatura.inverse.reasons import Infeasible
 from velatura.inverse.solution import Solution
 from velatura.model import DEFAULT, Model, named, variance_kind
@@ -54,7 +54,7 @@ FEWER = 2  # how many interfaces less are tried, too
 
 def fit_target(
     table: ReflectanceTable,
-    target: Target | Sequence[dict[str, object]],
+    target: TargetLike,
     starts: int = STARTS,
     model: str | Model = DEFAULT,
     seed: int = 0,

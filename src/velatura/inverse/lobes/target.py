@@ -16,8 +16,21 @@ from velatura.model.roughness_maps import MAPS, RoughnessMap
 from velatura.model.variance import Covariance, Isotropic, PerAxis, Roughness, Variance
 from velatura.stack import RGB, Mix, Stack, io
 from velatura.stack.mix import Described
-from velatura.stack.schema import Parameter, Record, show
-from velatura.stack.values import INDEX_HIGH, INDEX_LOW, Choice, Colour, Film, Films, Pair, Scalar, Text, Whole
+from velatura.stack.schema import Parameter, Record, Taken, by_default, show
+from velatura.stack.values import (
+    INDEX_HIGH,
+    INDEX_LOW,
+    Choice,
+    Colour,
+    Film,
+    Films,
+    NumberLike,
+    NumbersLike,
+    Pair,
+    Scalar,
+    Text,
+    Whole,
+)
 
 BLUR = MAPS["belcour"]  # in whose space a target's variance is given
 KEPT = 1e-6  # by which what is fixed may be missed
@@ -119,9 +132,15 @@ class TargetLobe(Record):
     The blur is a number, or two along axes that are turned by `rotation`.
     """
 
-    energy: Annotated[float | RGB, _colour("energy at normal incidence")]
-    alpha: Annotated[float | tuple[float, float] | None, _pair("GGX roughness of the lobe", high=1.0)] = None
-    variance: Annotated[float | tuple[float, float] | None, _pair("variance of the lobe, in place of alpha")] = None
+    energy: Annotated[Taken[NumberLike | NumbersLike, float | RGB], _colour("energy at normal incidence")]
+    alpha: Annotated[
+        Taken[NumberLike | NumbersLike | None, float | tuple[float, float] | None],
+        _pair("GGX roughness of the lobe", high=1.0),
+    ] = by_default(None)
+    variance: Annotated[
+        Taken[NumberLike | NumbersLike | None, float | tuple[float, float] | None],
+        _pair("variance of the lobe, in place of alpha"),
+    ] = by_default(None)
     rotation: Annotated[
         float, _number("turn of its first axis, anticlockwise seen from outside", low=-1e9, unit="degrees")
     ] = 0.0

@@ -12,9 +12,9 @@ from pydantic import model_validator
 from velatura.model.lobe_statistics import MixtureLobes, StackLobes
 from velatura.results import digits
 from velatura.stack import RGB, Stack
-from velatura.stack.schema import Parameter, Record
+from velatura.stack.schema import Parameter, Record, Taken, by_default
 from velatura.stack.spectra import lab
-from velatura.stack.values import Colour, Scalar
+from velatura.stack.values import Colour, NumberLike, NumbersLike, Scalar
 
 if TYPE_CHECKING:
     from velatura.inverse.fitting.free_values import Free
@@ -45,7 +45,10 @@ class Wish(Record):
     keeps_lobes: ClassVar[bool] = False
 
     angle: Annotated[float, Scalar("of incidence", low=0.0, high=STEEPEST, unit="degrees", texturable=False)] = 0.0
-    energy: Annotated[float | RGB | None, Colour("share of the light", low=0.0, high=1.0, texturable=False)] = None
+    energy: Annotated[
+        Taken[NumberLike | NumbersLike | None, float | RGB | None],
+        Colour("share of the light", low=0.0, high=1.0, texturable=False),
+    ] = by_default(None)
 
     @model_validator(mode="after")
     def _asks_for_something(self) -> Wish:
