@@ -257,7 +257,7 @@ def test_a_search_begins_with_a_given_stack() -> None:
 @pytest.mark.parametrize(
     ("start", "line"),
     [
-        (3, "start: must be a material, got 3"),
+        (3, "start: must be a material, or the name of a preset, got 3"),
         ({"layers": [{"interface": {"eta": -1}}]}, "start: layer 0 (interface): eta: must lie in"),
         ({"layers": [{"interface": {"eta": 1.5}}] * 2}, "start: must have as many interfaces as the lobes, 1, got 2"),
     ],

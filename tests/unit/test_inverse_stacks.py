@@ -29,7 +29,9 @@ from velatura.inverse import (
     load_target,
     plots,
 )
+from velatura.inverse.explain import why_not
 from velatura.inverse.lobes import pair
+from velatura.inverse.solution import in_closed_form
 from velatura.model import MODELS, Model, named
 from velatura.model.variance import Isotropic, Roughness
 from velatura.optics import fresnel
@@ -176,7 +178,31 @@ def test_the_index_follows_from_a_fixed_lower_roughness(model: Model) -> None:
 
 
 ROUGH_PAIR = {"energy": 0.0035, "alpha": 0.17, "interfaces": 2}
+ROUGH_SKIN = {"energy": 0.0029, "alpha": 0.18}
+PINNED_PAIR = {"alpha": 0.31, "interfaces": 2, "fixed": {"alpha": [None, 0.028]}}
 SMOOTH_PAIR = {"energy": [0.057, 0.056, 0.036], "alpha": 0.0, "interfaces": 2, "base": "conductor"}
+
+
+@pytest.mark.parametrize(
+    ("lobes", "lifted", "reason"),
+    [
+        ([ROUGH_SKIN, {"energy": 0.21, "alpha": 0.21}, {"energy": [0.37, 0.33, 0.53], "alpha": 0.18}], "alpha", "blur"),
+        ([{"energy": [0.49, 0.1, 0.37], **PINNED_PAIR}], "energy", "colour"),
+        ([{"energy": [0.002, 0.005, 0.006], "base": "conductor"}], "energy", "metal"),
+    ],
+)
+def test_of_several_reasons_the_one_whose_lifting_is_enough_is_named(lobes, lifted: str, reason: str) -> None:
+    """By the model in closed form that is next to the default one. Several constraints are violated at once.
+
+    Expected: with another value of what the reason names there is a stack; less energy alone does not do.
+    """
+    model, n = named("velatura").surrogate, len(lobes) - 1
+    assert why_not(Target(lobes), model) == (n, reason)
+    enough = {"blur": 0.8, "colour": 0.16, "metal": 0.2}[reason]
+    assert in_closed_form(Target([*lobes[:-1], {**lobes[-1], lifted: enough}]), model)
+    for scale in (0.5, 0.1, 0.01):
+        darker = tuple(scale * e for e in lobes[-1]["energy"])
+        assert not in_closed_form(Target([*lobes[:-1], {**lobes[-1], "energy": darker}]), model)
 
 
 @pytest.mark.parametrize(

@@ -23,6 +23,9 @@ SHOWN = 3  # ways out, the nearest ones
 FAR = 4.0  # the logarithm by which quantities change at most
 TINTED, PAIRED, OTHER, FREED, REMADE = 0.5, 0.5, 1.0, 0.5, 3.0  # what another form costs, or a change of another lobe
 SURE = (0.02, 0.002, 2e-4)  # energies of lobes that are almost always possible
+# Reasons that are lifted by other values than those fixed, by less energy, and by more
+OF_FIXED = ("absorption", "excess", "index", "fixed", "upper")
+ASKS_MORE, ASKS_LESS = ("energy", "bright", "unmet energy"), ("metal", "mirror", "upper")
 ROUNDING = 1e-9  # by which lobes stay below what there is
 
 
@@ -90,8 +93,9 @@ def _in_closed_form(target: Target, model: Model, pace: Pace = CLOSELY) -> Infea
 
 
 def why_not(target: Target, model: Model) -> tuple[int, str]:
-    """The first lobe without a solution, and the constraint that the best attempt violates most."""
-    spread, keep = EFFORT[-1]
+    """The first lobe without a solution, and the constraint that the best attempt violates most, of those that alone
+    are in the way, if there are any."""
+    (spread, keep), search = EFFORT[-1], Search(model)
     paths = stacks.beginning(target, model)
     for n, lobe in enumerate(target.lobes):
         above, tried = paths, stacks.extended(paths, lobe, target, spread, first=n == 0)
@@ -104,17 +108,19 @@ def why_not(target: Target, model: Model) -> tuple[int, str]:
             without = stacks.extended(above, free, target, spread, first=n == 0)
             if not len(stacks.pruned(without, free.interfaces, keep).cost):
                 tried, lobe = without, free
-        return n, _violated(tried, lobe)
+        first, reasons = target.model_copy(update={"lobes": target.lobes[: n + 1]}), _violated(tried, lobe)
+        return n, next((reason for reason in reasons if search.leads(_lifting(first, n, reason))), reasons[0])
     return len(target.lobes) - 1, UNMET[0]
 
 
-def _violated(tried: stacks.Partial, lobe: TargetLobe) -> str:
-    """The constraint that the best of the stacks that were tried violates most; if some violate one alone, of these.
+def _violated(tried: stacks.Partial, lobe: TargetLobe) -> list[str]:
+    """The constraints that stacks violate which were tried.
 
-    A colour that one index does not give is in the way at any brightness.
+    First is that which the best of them violates most; if some violate one alone, of these. A colour that one index
+    does not give is in the way at any brightness. Others follow by how little they are violated, and last any colour.
     """
     if not len(tried.cost):
-        return "fixed"  # between no two interfaces is there an index that gives it
+        return ["fixed"]  # between no two interfaces is there an index that gives it
     layers = tried.layers[-lobe.interfaces :]
     if not np.any(layers[0].feasible):  # what it leaves for the one below has no meaning
         layers = layers[:1]
@@ -127,8 +133,11 @@ def _violated(tried: stacks.Partial, lobe: TargetLobe) -> str:
     best = margins[:, np.argmax(np.where(alone | ~alone.any(), broken.sum(axis=0), -np.inf))]
     violated = names[int(np.argmin(best))]
     if violated == "energy" and np.ptp(lobe.colour) > 0 and dict(zip(names, best)).get("colour", 0) < 0:
-        return "colour"
-    return _named(violated, lobe)
+        violated = "colour"
+    least = np.where(broken < 0, broken, -np.inf).max(axis=1)
+    others = [names[k] for k in np.argsort(-least) if np.isfinite(least[k])]
+    last = ["colour"] if np.ptp(lobe.colour) > 0 else []
+    return list(dict.fromkeys(_named(name, lobe) for name in (violated, *others, *last)))
 
 
 def _named(constraint: str, lobe: TargetLobe) -> str:
@@ -138,6 +147,24 @@ def _named(constraint: str, lobe: TargetLobe) -> str:
     if lobe.fixed.of("eta", lobe.interfaces - 1) is not None:
         return "absorption"
     return "energy" if lobe.base == "dielectric" else "bright"
+
+
+def _lifting(target: Target, n: int, reason: str) -> Iterator[Way]:
+    """The ways to change just what a reason names."""
+    lobe = target.lobes[n]
+    own = np.maximum(lobe.colour, LEAST)
+    if reason in OF_FIXED and lobe.fixed != lobe.fixed.films_alone:
+        yield _at(target, target.with_lobe(n, fixed=lobe.fixed.films_alone), "", 0.0)
+    if reason in ASKS_MORE:
+        yield _darker(target, n)
+        yield from _evened(target, n, -1)
+    if reason in ASKS_LESS:
+        yield _with_energy(target, n, _scaled(own, 1))
+    if reason == "colour":
+        far = float(np.log(own.max() / own.min()))
+        yield _with_energy(target, n, _scaled(np.full(3, own.min()), 1), far=far, inclusive=True)
+    if reason in ("blur", "unmet blur"):
+        yield from _wider(target, n)
 
 
 # Ways out ------------------------------------------------------------------------------------------------------------
@@ -188,6 +215,10 @@ class Search:
         for direction in sorted((way.direction(ends[way]) for way in ends), key=lambda direction: direction.change):
             found.setdefault(direction.words, direction)
         return list(found.values())[:SHOWN]
+
+    def leads(self, ways: Iterable[Way]) -> bool:
+        """Whether a target on one of some ways has a stack."""
+        return next(self._bracketed(ways), None) is not None
 
     def of_lobe(self, target: Target, n: int) -> list[Direction]:
         """The nearest ways out of a lobe that cannot be given below those above it, without the lobes below."""
@@ -250,12 +281,23 @@ def _of_energy(target: Target, n: int, channels: bool = True) -> Iterator[Way]:
     for channel, name in zip(np.eye(3), "rgb" if channels else ""):
         for sign in (-1, 1):
             yield _with_energy(target, n, _scaled(own, sign * channel), f"{what} {name}")
-    apart = float(np.log(own.max() / own.min()))
-    dark, bright = _scaled(own.min(), 1), _scaled(own.max(), -1)
-    yield _with_energy(target, n, lambda x: np.maximum(own, dark(x)), f"{what}, its dark channels", far=apart)
-    yield _with_energy(target, n, lambda x: np.minimum(own, bright(x)), f"{what}, its bright channels", far=apart)
+    yield from _evened(target, n, 1)
+    yield from _evened(target, n, -1)
     for sign in (-1, 1):
         yield _with_energy(target, n, _scaled(np.full(3, own.mean()), sign), f"{what}, grey", inclusive=True)
+
+
+def _evened(target: Target, n: int, sign: int) -> Iterator[Way]:
+    """A coloured lobe whose dark channels (1) or bright ones (-1) are nearer to the others."""
+    own, name = np.maximum(target.lobes[n].colour, LEAST), f"lobe {n + 1} energy, its"
+    if np.ptp(own) == 0:
+        return
+    far = float(np.log(own.max() / own.min()))
+    dark, bright = _scaled(own.min(), 1), _scaled(own.max(), -1)
+    if sign > 0:
+        yield _with_energy(target, n, lambda x: np.maximum(own, dark(x)), f"{name} dark channels", far=far)
+    else:
+        yield _with_energy(target, n, lambda x: np.minimum(own, bright(x)), f"{name} bright channels", far=far)
 
 
 def _darker(target: Target, n: int, cost: float = 0.0) -> Way:
@@ -273,6 +315,11 @@ def _sharper(target: Target, n: int, cost: float = 0.0) -> Iterator[Way]:
 def _of_blur(target: Target, n: int) -> Iterator[Way]:
     """A lobe of other variance."""
     yield from _sharper(target, n)
+    yield from _wider(target, n)
+
+
+def _wider(target: Target, n: int) -> Iterator[Way]:
+    """A lobe of more variance, unless it has the most."""
     s, widest = float(BLUR.variance(target.lobes[n].roughness)), float(BLUR.variance(1.0))
     if s < widest:
         s = max(s, LEAST)
