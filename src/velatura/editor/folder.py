@@ -111,7 +111,7 @@ class Folder:
         path = self.place(name, PICTURES)
         data = _decoded(body)
         with self.writing:
-            free = _free(path, data)
+            free = self.free(path, data)
             if not free.exists():
                 _write(free, data, check=lambda written: _check_picture(written, name))
         return {"file": free.name}
@@ -175,6 +175,12 @@ class Folder:
             return path
         return self.existing(name, PICTURES)
 
+    def free(self, path: Path, data: bytes | None = None) -> Path:
+        """The path, or with a number where another file, of other data than these, has the name."""
+        numbered = (path.with_stem(f"{path.stem}-{i}") for i in itertools.count(2))
+        same = (p for p in itertools.chain([path], numbered) if not p.exists() or p.read_bytes() == data)
+        return next(same)
+
     def existing(self, name: str, endings: Sequence[str]) -> Path:
         """The path of an existing file. Raises InvalidInput as `place`, and where it is missing or too large."""
         path = self.place(name, endings)
@@ -230,9 +236,3 @@ def _check_picture(path: Path, name: str) -> None:
         kernel.bitmap(path)
     except InvalidInput:
         raise InvalidInput(f"{name}: is no picture that can be read") from None
-
-
-def _free(path: Path, data: bytes) -> Path:
-    """The path, or with a number where another file has the name."""
-    numbered = (path.with_stem(f"{path.stem}-{i}") for i in itertools.count(2))
-    return next(p for p in itertools.chain([path], numbered) if not p.exists() or p.read_bytes() == data)

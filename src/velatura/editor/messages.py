@@ -232,6 +232,12 @@ KEYS: dict[str, Parameter] = {
     "camera": Camera("that sees it"),
     "size": Size("of a picture, a map"),
     "spp": Whole("samples per pixel", low=1, high=64),
+    "samples": Whole("per pixel of a picture that is written", low=1, high=65536),
+    "step": Whole("of a picture that is written", high=2**31),
+    "walk": Flag("through the layers, instead of the model"),
+    "transparent": Flag("the ground of a picture"),
+    "denoised": Flag("the picture"),
+    "exposure": Scalar("of a picture, in stops", low=-20, high=20, texturable=False),
     "seed": Whole("of the random numbers", low=1, high=2**31),
 }
 

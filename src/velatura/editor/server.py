@@ -30,6 +30,7 @@ from velatura.editor import bundle, guard
 from velatura.editor.folder import LARGEST, Conflict, Folder
 from velatura.editor.guard import Guard, refusal
 from velatura.editor.messages import Answer, Body, Verb, field
+from velatura.editor.rendering import Renderings
 from velatura.editor.service import VERBS
 from velatura.errors import InvalidInput, VelaturaError
 from velatura.stack.schema import unknown
@@ -47,7 +48,7 @@ SPARE = 4  # threads of a kind beside these, for answers that were given up, whi
 LANE_OF = {
     **dict.fromkeys(("shader", "values", "appearance", "wishes"), "picture"),
     **dict.fromkeys(("invert", "ways", "wish", "class", "member", "coat", "targets"), "slow"),
-    **dict.fromkeys(("truth", "validation", "film", "export", "import"), "slow"),
+    **dict.fromkeys(("truth", "validation", "film", "export", "import", "render"), "slow"),
 }
 
 
@@ -100,7 +101,7 @@ def application(material: str | None, token: str) -> Guard:
             opened = None
         return {**VERBS["session"](body), "opened": opened}
 
-    desk = Desk({**VERBS, **folder.verbs, "session": session})
+    desk = Desk({**VERBS, **folder.verbs, **Renderings(folder).verbs, "session": session})
 
     async def call(request: Request) -> Response:
         name = request.path_params["verb"]

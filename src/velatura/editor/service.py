@@ -16,7 +16,7 @@ from numpy.typing import ArrayLike
 from pydantic.fields import FieldInfo
 
 from velatura import kernel
-from velatura.editor import appearance, class_maps, exporting, films, truth, validations, wishes
+from velatura.editor import appearance, class_maps, exporting, films, rendering, truth, validations, wishes
 from velatura.editor.messages import (
     Answer,
     Body,
@@ -121,6 +121,7 @@ def _constants() -> Answer:
         "models": [_model(model) for model in MODELS],
         "default_model": DEFAULT,
         "formats": exporting.formats(),
+        "denoises": rendering.can_denoise(),
         "names": _names(),
         "objects": list(OBJECTS),
         "environments": [{"name": name, "title": _titled(name), "url": url} for name, url in environments],

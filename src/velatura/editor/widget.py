@@ -11,6 +11,7 @@ from urllib.parse import unquote
 from velatura.editor import bundle
 from velatura.editor.folder import Conflict, Folder
 from velatura.editor.messages import Answer, admitted, document, field, material_of, model_of
+from velatura.editor.rendering import Renderings
 from velatura.editor.service import FILES, VERBS
 from velatura.errors import InvalidInput, VelaturaError, needs
 from velatura.model import DEFAULT, SWITCHES, Model, named
@@ -131,7 +132,7 @@ class Editor(anywidget.AnyWidget):
     ) -> None:
         self._described: tuple[Described | None, Answer] = None, {}
         self._folder = Folder()
-        self._verbs = {**VERBS, **self._folder.verbs}
+        self._verbs = {**VERBS, **self._folder.verbs, **Renderings(self._folder).verbs}
         self._threads = ThreadPoolExecutor(THREADS)
         super().__init__(stack="coated-gold" if stack is None else stack, model=model, height=height)
         self.on_msg(self._asked)

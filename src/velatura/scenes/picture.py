@@ -92,6 +92,14 @@ def tone_map(linear: ArrayLike, knee: float = 0.7) -> NDArray[np.float64]:
     return srgb_curve(x)
 
 
+def _displayed(image: NDArray[Any]) -> NDArray[np.float64]:
+    """Display values of RGB, or of RGBA, whose alpha stays."""
+    colours, alpha = image[..., :3], np.clip(image[..., 3:], 0.0, 1.0)
+    if not alpha.size:
+        return tone_map(colours)
+    return np.concatenate([tone_map(colours / np.maximum(alpha, 1e-6)), alpha], axis=-1)
+
+
 def srgb_curve(linear: NDArray[np.floating]) -> NDArray[np.float64]:
     """Display values of linear ones in [0, 1], by the curve of sRGB (IEC 61966-2-1)."""
     return np.where(linear <= 0.0031308, 12.92 * linear, 1.055 * linear ** (1.0 / 2.4) - 0.055)
@@ -103,7 +111,8 @@ def check_writable(path: Name) -> Path:
 
 
 def write_image(image: ArrayLike, path: Name) -> None:
-    """Write linear RGB (height, width, 3), whole or not at all: `.png` tone-mapped, `.exr` linear float32.
+    """Write linear RGB (height, width, 3), whole or not at all: `.png` tone-mapped, `.exr` linear float32; or RGBA with
+    colours that are weighed by alpha, which those of a PNG are not.
 
     Raises InvalidInput where `check_writable` does.
     """
@@ -111,7 +120,7 @@ def write_image(image: ArrayLike, path: Name) -> None:
     mi = kernel.mitsuba()
     formats = mi.Bitmap.FileFormat
     if target.suffix.lower() == ".png":
-        pixels: Any = np.round(255.0 * tone_map(image)).astype(np.uint8)
+        pixels: Any = np.round(255.0 * _displayed(np.asarray(image))).astype(np.uint8)
         format = formats.PNG
     else:
         pixels = np.asarray(image, dtype=np.float32)

@@ -99,7 +99,7 @@ export function mount(root, { call, lacks = nothingLacks, live, session, storage
   // The page follows both
 
   const toolbar = createToolbar({
-    ...{ store, session, call, lacks, live, address, files, messages, update, choose },
+    ...{ store, session, viewport, call, lacks, live, address, files, messages, update, choose },
     /** Opens a target that Python has answered, as a material that has it. */
     openTarget({ material, model, ...said }) {
       appearance.know(material, model, said);

@@ -144,6 +144,8 @@ export function createFiles({ store, session, call, lacks, storage, messages, ad
 
     /** Puts a picture into the folder; the name that it has there. */
     upload: async (file) => (await call('texture', { file: file.name, data: await base64(file) })).file,
+    /** The name of light as Python knows it: a dropped file is put into the folder. */
+    lightOf: async (name) => (name.startsWith(DROPPED) ? files.upload(await dropped(name)) : name),
     takeEnvironment: (file) =>
       messages.attempt('environment', async () => {
         readPicture(file.name, await file.arrayBuffer());

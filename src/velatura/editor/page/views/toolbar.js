@@ -7,6 +7,7 @@ import { isChanged, placeOf } from '../state/commands.js';
 import { FOREIGN } from '../files.js';
 import { iconButton } from './controls.js';
 import { createExports } from './exporting.js';
+import { createRendering } from './rendering.js';
 
 /** `view()`, `saveAs()` and `saveAgain()` as its buttons do, and `mix()`, which chooses what the material is mixed with. */
 export function createToolbar(services) {
@@ -15,6 +16,7 @@ export function createToolbar(services) {
   const bar = {
     ...services,
     exports: createExports(services),
+    rendering: createRendering(services),
     dialogs,
     listed: null, // files of the folder
     targets: null, // of the papers
@@ -60,10 +62,13 @@ function toolbar(bar) {
       </span>
       <span class="rest"></span>
       <button type="button" @click=${bar.exports.show} title="For other programs">Export</button>
+      <button type="button" ?disabled=${bar.lacks('render')} @click=${bar.rendering.show} title=${bar.lacks('render') || 'By Mitsuba, into the folder'}>
+        ${bar.rendering.title}
+      </button>
       <button type="button" @click=${bar.savePicture} title="As PNG">Save picture</button>
       <span class="presence" role="status">${bar.live?.online === false ? 'Offline, trying again' : ''}</span>
     </header>
-    ${openPanel(bar)} ${savePanel(bar)} ${bar.exports.view()}
+    ${openPanel(bar)} ${savePanel(bar)} ${bar.exports.view()} ${bar.rendering.view()}
   `;
 }
 

@@ -1,0 +1,67 @@
+"""What the page sees, as Mitsuba's scene: an object of a material in an environment, from the page's camera."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from velatura import kernel
+from velatura.editor.messages import Body
+from velatura.errors import InvalidInput
+
+LIGHT = (".exr", ".hdr")  # files that light an object
+
+
+@dataclass(frozen=True)
+class Shot:
+    """The object, the environment and its rotation in degrees about y, and the camera."""
+
+    name: str
+    environment: str
+    rotation: float
+    camera: Mapping[str, Any]
+
+    @classmethod
+    def of(cls, body: Body, light: Path | None = None) -> Shot:
+        """That of a body: `object`, `environment`, `rotation`, `camera`; `light` is the file of an environment.
+
+        Raises:
+            InvalidInput: an unknown object or environment, or no camera.
+        """
+        from velatura import scenes
+
+        name, environment, camera = body.get("object"), body.get("environment", "studio"), body.get("camera")
+        if name not in scenes.OBJECTS:
+            raise InvalidInput(f"object: must be one of {', '.join(scenes.OBJECTS)}, got {name!r}")
+        if light is None and environment not in scenes.ENVIRONMENTS:
+            raise InvalidInput(f"environment: must be one of {', '.join(scenes.ENVIRONMENTS)}, got {environment!r}")
+        if camera is None:
+            raise InvalidInput("camera: must be an object of fov, origin and target, got nothing")
+        return cls(name, str(light or environment), math.fmod(body.get("rotation", 0), 360), camera)
+
+    def scene(self, bsdf: Any, size: tuple[int, int]) -> dict[str, Any]:
+        """The scene of a BSDF for `mi.load_dict`, with pixels."""
+        from velatura import scenes
+
+        mi = kernel.mitsuba()
+        scene = scenes.scene_dict(self.name, self.environment, bsdf, size)
+        scene["light"] = scenes.emitter(mi, self.environment, self.rotation)
+        scene["sensor"] |= {
+            "to_world": mi.ScalarTransform4f().look_at(self.camera["origin"], self.camera["target"], [0, 1, 0]),
+            "fov": self.camera["fov"],
+        }
+        return scene
+
+
+def sides(body: Body, largest: int) -> tuple[int, int]:
+    """Width and height in pixels. Raises InvalidInput."""
+    size = body.get("size")
+    if not isinstance(size, list) or len(size) != 2:
+        raise InvalidInput("size: must be a width and a height")
+    for side, length in zip(("width", "height"), size):
+        if length > largest:
+            raise InvalidInput(f"{side}: must be a whole number from 1 to {largest}, got {length}")
+    return size[0], size[1]

@@ -1,0 +1,73 @@
+"""Pictures that the editor's page has Mitsuba render, in headless Chromium.
+
+Rationale: a dialog, the server's steps and the folder work together, and the page must stay alive meanwhile.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+import chromium
+import numpy as np
+import pytest
+from editor import Server, Tabs, Visit, unexpected
+
+from velatura import kernel
+
+pytestmark = pytest.mark.skipif(bool(chromium.missing()), reason=chromium.missing())
+
+Open = Callable[..., Visit]
+
+
+@pytest.fixture(scope="module")
+def tabs(opened: Any) -> Tabs:
+    return Tabs(opened)
+
+
+@pytest.fixture
+def visit(tabs: Tabs, served: Server) -> Iterator[Open]:
+    """Opens the page, with the preset coated-gold, in a browser without a past, whose console may not complain."""
+    yield lambda: tabs.visit(served.entrance)
+    assert unexpected(tabs.forget(), []) == []
+    for file in served.folder.iterdir():
+        file.unlink()
+
+
+def typed(page: Visit, label: str, value: int) -> None:
+    field = page.page.locator("dialog.render").get_by_label(label, exact=True)
+    field.fill(str(value))
+    field.press("Enter")
+
+
+def test_a_picture_is_rendered_into_the_folder_and_one_is_stopped(visit: Open, served: Server) -> None:
+    page = visit()
+    button = lambda name: page.page.get_by_role("button", name=name, exact=True)  # noqa: E731
+    dialog = page.page.locator("dialog.render")
+    button("Render").click()
+    for label, value in (("Width", 96), ("Height", 54), ("Samples", 16)):
+        typed(page, label, value)
+    dialog.get_by_label("Transparent ground").check()
+    dialog.get_by_role("button", name="Render").click()
+    dialog.locator("figure img").wait_for()
+    page.page.wait_for_function("() => document.querySelector('dialog.render img').naturalWidth === 96")
+    picture = np.array(kernel.bitmap(Path(served.folder / "coated-brushed-gold.png")))
+    assert picture.shape == (54, 96, 4)
+    assert picture[0, 0, 3] == 0
+    assert picture[..., 3].max() == 255
+
+    # Another one goes on while the page does, and is stopped
+    dialog.get_by_label("Format of the picture").select_option("exr")
+    typed(page, "Samples", 65536)
+    dialog.get_by_role("button", name="Render").click()
+    dialog.get_by_role("progressbar").wait_for()
+    dialog.get_by_role("button", name="Close, and go on").click()
+    rough = page.page.locator(".layer").nth(0).get_by_label("Roughness", exact=True)
+    rough.fill("0.2")
+    rough.press("Enter")
+    page.settled()
+    page.page.get_by_role("button", name="Rendering").click()
+    dialog.get_by_role("button", name="Stop").click()
+    dialog.get_by_role("button", name="Render").wait_for()
+    assert [file.name for file in served.folder.iterdir()] == ["coated-brushed-gold.png"]

@@ -1,0 +1,102 @@
+"""Pictures that the editor's server writes step by step, against those of `velatura.scenes.render`."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from velatura import kernel, scenes
+from velatura.editor import rendering
+from velatura.editor.folder import Folder
+from velatura.errors import InvalidInput
+
+VIEW = scenes.OBJECTS["sphere"].view
+BODY: dict[str, Any] = {
+    "material": {"layers": [{"interface": {"conductor": "mirror"}}]},
+    "object": "sphere",
+    "environment": "studio",
+    "camera": {"origin": list(VIEW.origin), "target": list(VIEW.target), "fov": VIEW.fov},
+    "size": [24, 16],
+    "samples": 40,
+    "file": "ball.exr",
+}
+
+
+@pytest.fixture
+def renderings(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> rendering.Renderings:
+    monkeypatch.chdir(tmp_path)
+    return rendering.Renderings(Folder())
+
+
+def made(renderings: rendering.Renderings, **changes: Any) -> tuple[np.ndarray, int]:
+    """The picture in the file that was written, and the number of steps."""
+    answer: dict[str, Any] = {"step": 0}
+    count = 0
+    while "file" not in answer:
+        answer = renderings.verbs["render"]({**BODY, "key": "one", **changes, "step": answer["step"]})
+        count += 1
+    return np.array(kernel.bitmap(Path(answer["file"]))), count
+
+
+def test_a_picture_in_steps_and_bands_is_that_of_scenes(
+    renderings: rendering.Renderings, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Expected: within noise, which is that of 40 samples of a mirror in softboxes; also across the edges of bands."""
+    mi = kernel.mitsuba()
+    mirror = mi.load_dict({"type": "conductor", "material": "none"})
+    expected = scenes.render(mirror, "sphere", spp=400, size=(24, 16))
+    whole, count = made(renderings)
+    assert (whole.shape, count) == ((16, 24, 3), 1)
+    monkeypatch.setattr(rendering, "MOST", 24 * 6)  # bands of 6, 6 and 4 rows
+    bands, count = made(renderings, samples=20, key="two")
+    assert count == 3 * 20
+    for picture in (whole, bands):
+        assert float(np.sqrt(np.mean((picture - expected) ** 2))) < 0.25
+        assert float(np.mean(picture)) == pytest.approx(float(np.mean(expected)), rel=0.05)
+
+
+def test_a_transparent_ground_has_no_plinth_and_files_are_numbered(renderings: rendering.Renderings) -> None:
+    picture, _ = made(renderings, transparent=True, file="ball.png")
+    assert picture.shape == (16, 24, 4)
+    assert picture[0, 0].tolist() == [0, 0, 0, 0]
+    assert picture[8, 12, 3] == 255
+    made(renderings, key="two", file="ball.png")
+    assert sorted(path.name for path in Path().iterdir()) == ["ball-2.png", "ball.png"]
+
+
+def test_a_step_that_was_made_is_not_made_again_and_another_picture_ends_it(renderings: rendering.Renderings) -> None:
+    render = renderings.verbs["render"]
+    body = {**BODY, "size": [512, 512], "samples": 9, "environment": "furnace"}  # four samples a step
+    assert render({**body, "key": "a"}) == {"step": 1, "steps": 3}
+    assert render({**body, "key": "a"}) == {"step": 1, "steps": 3}
+    assert "file" in render({**BODY, "key": "b"})
+    with pytest.raises(InvalidInput, match="no longer under way"):
+        render({**body, "key": "a", "step": 1})
+
+
+@pytest.mark.parametrize(
+    ("changes", "says"),
+    [
+        ({"file": "../ball.png"}, "must be the plain name of a file"),
+        ({"file": "ball.yaml"}, "must end in .png, .exr"),
+        ({"environment": "none.exr"}, "none.exr: there is no such file"),
+        ({"object": "file:mine.obj"}, "object: must be one of ball"),
+        ({"size": [8, 5000]}, "size: .*4096"),
+    ],
+)
+def test_a_wrong_body_is_one_line(renderings: rendering.Renderings, changes: dict[str, Any], says: str) -> None:
+    with pytest.raises(InvalidInput, match=says):
+        made(renderings, **changes)
+
+
+def test_a_picture_is_denoised(renderings: rendering.Renderings) -> None:
+    """Expected: nearer to a picture of many samples than what it was made of."""
+    pytest.importorskip(rendering.DENOISER)
+    rough = {"material": {"layers": [{"interface": {"conductor": "Au", "alpha": 0.4}}]}, "size": [64, 64]}
+    many, _ = made(renderings, **rough, samples=256)
+    few, _ = made(renderings, **rough, samples=4, key="two")
+    calm, _ = made(renderings, **rough, samples=4, key="three", denoised=True)
+    assert np.sqrt(np.mean((calm - many) ** 2)) < 0.5 * np.sqrt(np.mean((few - many) ** 2))
