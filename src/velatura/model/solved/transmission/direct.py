@@ -283,7 +283,8 @@ def _components(
     widths_below = _from_bottom([_width(*each) for each in zip(refractions, below)], operator.add)
     over, at, under = ([_weight(*each) for each in zip(refractions, steps)] for steps in (above, own, below))
     over_all, under_all = _from_top(over, operator.add), _from_bottom(under, operator.add)
-    tails = [_tail(refraction, d) for refraction in refractions] if d is not None else []
+    # Tails of isotropic interfaces are alike
+    lengths2 = [_length2(x, d) for x in refractions if d is not None and not isinstance(x.width, Isotropic)]
     found = []
     for j, (refraction, size) in enumerate(zip(refractions, sizes)):
         width, scale, weight, total = refraction.width, ops.power(size, -fitted.EXPONENT), at[j], at[j]
@@ -291,8 +292,10 @@ def _components(
             width, total = width + widths_above[j - 1] * scale, over_all[j - 1] + total
         if j < last:
             width, total = width + widths_below[j + 1] * scale, total + under_all[j + 1]
-        if tails:
-            weights = [x * tail(total) for x, tail in zip([*over[:j], weight, *under[j + 1 :]], tails)]
+        if lengths2:
+            # Densities of tails, but for what all have in common
+            ends = [length2 + total for length2 in lengths2]
+            weights = [x / (end * end) for x, end in zip([*over[:j], weight, *under[j + 1 :]], ends)]
             weight, total = weights[j], reduce(operator.add, weights)
         found.append(_Component(size, width.roughness(WIDTHS), weight / total))
     return found
@@ -309,20 +312,11 @@ def _weight(refraction: Refraction, step: Value) -> Value:
     return width2 + WIDTH2_MIN * refraction.n_1 * refraction.n_2
 
 
-def _tail(refraction: Refraction, d: Momentum) -> Callable[[Value], Value]:
-    """Density of an interface's tail in the direction of d, over that of one that is isotropic, by the square of the
-    width of all; 1 within that."""
+def _length2(refraction: Refraction, d: Momentum) -> Value:
+    """Square of the length of d, by which the tail of an interface falls, as for one that is isotropic."""
     alpha_u, alpha_v, rotation = refraction.roughness
-    if isinstance(refraction.width, Isotropic):
-        return lambda width2: 1.0
     x, y, _ = _turned((*d, 0.0), rotation)
-    own, even = x * x * (alpha_v / alpha_u) + y * y * (alpha_u / alpha_v), x * x + y * y
-
-    def density(width2: Value) -> Value:
-        near = (own + width2) / (even + width2)
-        return 1 / (near * near)
-
-    return density
+    return x * x * (alpha_v / alpha_u) + y * y * (alpha_u / alpha_v)
 
 
 def _drawn(transmission: Transmission, i: MomentumInSlabs) -> tuple[list[_Component], list[Value]]:
