@@ -207,9 +207,12 @@ def _kernel(
         places = itertools.count(1)
         read = _mapped(numbers, lambda _: dr.gather(number, given, next(places)), module.Array3f64)
 
+        # Read before the loop, from which LLVM takes all that depends on sources alone
+        at_source = [dr.gather(number, x, source) for x in of_sources]
+
         def found(k: Any) -> Found:
             each = [dr.gather(number, x, k * width + source if of_own else k) for x, of_own in zip(of_samples, own)]
-            return function([dr.gather(number, x, source) for x in of_sources], each, read)
+            return function(at_source, each, read)
 
         def step(k: Any, sums: list[Any], largest: list[Any]) -> tuple[Any, list[Any], list[Any]]:
             more = found(k)
