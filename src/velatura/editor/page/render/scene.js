@@ -14,17 +14,24 @@ const LEAF = 0xffff0000;
 const GRID = 0xffff;
 
 /**
- * One mesh of parts [{role, positions, normals, uv, triangles}], with its textures for ray tracing.
+ * One mesh of parts [{role, positions, normals, uv, triangles}].
  *
- * @returns {{positions, normals, tangents, uv, materials, triangles, nodes, packed, count}} per vertex, but
- *   for `triangles` (three vertices each), `nodes` and `packed` (RGBA, whole rows), the `count` of nodes and
- *   their `grid`.
+ * @returns {{positions, normals, tangents, uv, materials, triangles}} per vertex, but for `triangles` (three vertices
+ *   each).
  */
 export function buildScene(parts) {
   const mesh = joined(parts);
+  return { ...mesh, tangents: averaged(mesh, tangents(mesh)) };
+}
+
+/**
+ * The textures of a mesh for ray tracing, which takes a moment; sorts its triangles.
+ *
+ * @returns {{nodes, packed, count, grid}} `nodes` and `packed` (RGBA, whole rows), the `count` of nodes and their `grid`.
+ */
+export function forPaths(mesh) {
   const bvh = hierarchy(mesh);
-  const frames = tangents(mesh);
-  return { ...mesh, ...bvh, tangents: averaged(mesh, frames), packed: packed(mesh, frames) };
+  return { ...bvh, packed: packed(mesh, tangents(mesh)) };
 }
 
 function joined(parts) {

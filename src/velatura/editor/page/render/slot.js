@@ -47,7 +47,7 @@ export class Slot {
   shades = null; // two targets: by how much paths make the preview darker, and a spare one
   #loader;
   #asked = null; // the shader that was set last, which may be compiling
-  #tracing = null;
+  #tracing = null; // compiled once paths are wanted
   #lighting = null;
   #adding = null;
   #learning = null;
@@ -80,8 +80,7 @@ export class Slot {
     if (this.shader?.key !== shader.key) {
       this.#asked = shader;
       const baked = [...new Set(shader.parts.flatMap((part) => part.baked?.tables ?? []))];
-      const [tracing, lit, tables, looked, maps] = await Promise.all([
-        device.program(tracer(shader)),
+      const [lit, tables, looked, maps] = await Promise.all([
         device.program(lighting(shader)),
         shader.tables && this.#loader.tables(shader.tables),
         Promise.all(baked.map((name) => this.#loader.table(name))),
@@ -91,7 +90,7 @@ export class Slot {
       if (this.#asked !== shader) return;
       device.free(this.#textures.vt_baked, this.#textures.vt_films);
       this.shader = shader;
-      this.#tracing = tracing;
+      this.#tracing = null;
       this.#lighting = lit;
       this.#textures = { vt_tables: tables };
       shader.maps?.forEach(({ sampler }, i) => (this.#textures[sampler] = maps[i]));
@@ -207,9 +206,18 @@ export class Slot {
     return gbuffer.warm(this.#lighting, { ...this.#textures, ...uniforms });
   }
 
-  /** The same of paths. */
-  warmPaths(uniforms) {
-    return this.device.warm(this.#tracing, { ...this.#textures, ...uniforms }, 'RGBA32F');
+  /** Compiles what traces paths of the material, where nothing has done so, and waits for their first pixel. */
+  async warmPaths(uniforms) {
+    const { device, shader } = this;
+    const tracing = await device.program(tracer(shader));
+    if (this.shader !== shader) return;
+    this.#tracing = tracing;
+    await device.warm(tracing, { ...this.#textures, ...uniforms }, 'RGBA32F');
+  }
+
+  /** Whether paths of the material can be traced; until `warmPaths` they cannot. */
+  get traces() {
+    return this.#tracing !== null;
   }
 
   forget() {

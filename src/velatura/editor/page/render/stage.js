@@ -1,11 +1,12 @@
 // The object and the light around it, on the device.
 
 import { cameraUniforms } from './camera.js';
-import { NODES_WIDTH, TRIANGLES_WIDTH } from './scene.js';
+import { NODES_WIDTH, TRIANGLES_WIDTH, forPaths } from './scene.js';
 
 export class Stage {
   #device;
-  #nodes = null;
+  #scene = null; // the object, as buildScene has it
+  #nodes = null; // of the hierarchy over it, and its triangles, once paths are wanted
   #triangles = null;
   #traversal = null;
   #radiance = null; // with the density of the cells of the environment
@@ -18,17 +19,23 @@ export class Stage {
   }
 
   get hasObject() {
-    return this.#nodes !== null;
+    return this.#scene !== null;
   }
 
   get hasLight() {
     return this.#radiance !== null;
   }
 
-  /** Takes an object as buildScene lays it out. */
-  setObject({ nodes, packed, count, grid }) {
+  /** Takes an object as buildScene has it. */
+  setObject(scene) {
+    this.#device.free(this.#nodes, this.#triangles);
+    this.#scene = scene;
+    this.#nodes = this.#triangles = this.#traversal = null;
+  }
+
+  #layOut() {
     const device = this.#device;
-    device.free(this.#nodes, this.#triangles);
+    const { nodes, packed, count, grid } = forPaths(this.#scene);
     this.#nodes = device.texture('RGBA32UI', NODES_WIDTH, nodes.length / (4 * NODES_WIDTH), nodes);
     this.#triangles = device.texture('RGBA32F', TRIANGLES_WIDTH, packed.length / (4 * TRIANGLES_WIDTH), packed);
     this.#traversal = {
@@ -38,6 +45,7 @@ export class Stage {
       grid_origin: grid.origin,
       grid_scale: grid.scale,
     };
+    return this.#traversal;
   }
 
   /** Takes light as prepare of environment.js makes it ready. */
@@ -53,7 +61,7 @@ export class Stage {
 
   /** The device has lost the object, and all else; nothing is to be drawn. */
   lose() {
-    this.#nodes = null;
+    this.#scene = null;
   }
 
   /** The uniforms of both, for a picture from a camera, with the light turned by `rotation` degrees. */
@@ -66,7 +74,11 @@ export class Stage {
       environment_blurred: this.#blurred,
       environment_turn: [Math.cos(turn), Math.sin(turn)],
       irradiance: this.#irradiance,
-      ...this.#traversal,
     };
+  }
+
+  /** The same for paths; the first call for an object builds the hierarchy over it. */
+  pathUniforms(camera, size, rotation) {
+    return { ...this.uniforms(camera, size, rotation), ...(this.#traversal ?? this.#layOut()) };
   }
 }

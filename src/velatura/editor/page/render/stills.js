@@ -32,6 +32,7 @@ export class Thumbnails {
     const slot = (this.#slot ??= new Slot(device, this.#loader));
     if (slot.pass?.width !== size) slot.setSize(size, size);
     await slot.setMaterial(shader, contents);
+    await slot.warmPaths(uniforms);
     slot.samples = 0;
     while (slot.samples < samples) {
       slot.trace(uniforms);

@@ -231,7 +231,7 @@ export class Viewport {
 
   /** A small square picture of another material on the same object, from here; an ImageData. */
   thumbnail(shader, contents, size, samples) {
-    const uniforms = this.uniforms({ width: size, height: size });
+    const uniforms = this.pathUniforms({ width: size, height: size });
     return this.thumbnails.draw(shader, contents, { size, samples, exposure: this.settings.exposure, uniforms });
   }
 
@@ -251,6 +251,11 @@ export class Viewport {
   /** The uniforms of object, light and camera, for a picture of a size. */
   uniforms(size = this.frame) {
     return this.stage.uniforms(this.camera, size, this.settings.rotation);
+  }
+
+  /** The same for pictures of paths. */
+  pathUniforms(size = this.frame) {
+    return this.stage.pathUniforms(this.camera, size, this.settings.rotation);
   }
 
   dispose() {
@@ -393,8 +398,9 @@ export class Viewport {
 
   /** A slice of paths, in all slots that are seen. The device works on it while we wait for the one before. */
   async #trace() {
-    await Promise.all(this.#seen().map((slot) => slot.warmPaths(this.uniforms())));
-    const uniforms = this.uniforms(), { height } = this.frame, before = this.#slice;
+    await Promise.all(this.#seen().map((slot) => slot.warmPaths(this.pathUniforms())));
+    if (!this.#seen().every((slot) => slot.traces)) return; // materials have come meanwhile
+    const uniforms = this.pathUniforms(), { height } = this.frame, before = this.#slice;
     let rows = 0;
     for (let band; this.samples < this.budget.samples && (band = this.#bands.next(height, rows)); ) {
       for (const slot of this.#seen()) slot.trace(uniforms, band);
