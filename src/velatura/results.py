@@ -151,6 +151,14 @@ def digits(value: float | tuple[float, ...]) -> str:
     return f"{value:.4g}" if isinstance(value, float) else "[" + ", ".join(f"{x:.4g}" for x in value) + "]"
 
 
+def cell(values: Any) -> str:
+    """Numbers in a line of four digits, one where they are all alike; a dash for None."""
+    import numpy as np
+
+    found = ["-"] if values is None else [f"{x:.4f}" for x in np.ravel(values)]
+    return found[0] if len(set(found)) == 1 else " ".join(found)
+
+
 def numbers(values: Any, form: str = ".4f") -> str:
     """Numbers in a line; with one set of them per channel, a line each."""
     if values.ndim > 1:

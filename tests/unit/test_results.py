@@ -15,6 +15,7 @@ from velatura.results import LINES, Table, printed
 
 HOSTILE = '<script>alert(1)</script> & "quoted" [red]'
 COSINES = [1.0, 0.5]
+LOBES = [{"energy": 0.04}, {"energy": 0.5, "alpha": 0.2, "base": "conductor"}]
 
 
 def mixture() -> vt.Mix:
@@ -41,6 +42,7 @@ RESULTS: dict[str, Callable[[], Any]] = {
     "coat": lambda: vt.inverse.coat("coated-gold", 1.3),
     "table": lambda: table_of(40),
     "fit": lambda: vt.inverse.fit(table_of(12), ["coated-gold"], "bati2021"),
+    "solution": lambda: vt.inverse.invert_stack(LOBES, "bati2021"),
     "model": lambda: vt.MODELS[-1],
     "bsdf": lambda: vt.bsdf("coated-gold"),
     "shader": lambda: vt.shader.shader("coated-gold"),
@@ -105,6 +107,10 @@ def test_plots_return_axes_of_matplotlib() -> None:
     legend = energy.get_legend()
     assert legend is not None and [text.get_text() for text in legend.get_texts()] == ["R1", "R2", "T", "remainder"]
     assert len(alpha.lines) == 2 * 3
+    solution, table = vt.inverse.invert_stack(LOBES, "bati2021"), table_of(12)
+    assert [axes.get_title() for axes in solution.plot().axes] == ["lobe 1: one dielectric", "lobe 2: one conductor"]
+    found = vt.inverse.fit(table, ["coated-gold"], "bati2021").plot(table, "gold")
+    assert found.get_suptitle().startswith("gold: the closest stack, by bati2021")
     bars = report.plot()
     assert [label.get_text() for label in bars.get_yticklabels()] == [each.law for each in report.findings]
     own = pyplot.figure().subplots()

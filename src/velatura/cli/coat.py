@@ -12,8 +12,6 @@ import typer
 from velatura.cli import invert, options
 
 if TYPE_CHECKING:
-    from rich.table import Table
-
     from velatura.inverse import Coated
     from velatura.stack import Stack
 
@@ -48,11 +46,13 @@ def coat(
     if output:
         save(coated.stack, output)
     if as_json:
-        answer = {"stack": coated.stack.to_dict(), "coat": coated.own(), "lobes": coated.change(), **_diffuse(coated)}
+        diffuse = {"diffuse": coated.change_of_base()} if coated.diffuse else {}
+        answer = {"stack": coated.stack.to_dict(), "coat": coated.own(), "lobes": coated.change(), **diffuse}
         answer |= {"losses": list(coated.losses)} if keep_appearance else {}
         print(json.dumps({"model": coated.model.name, **answer}, allow_nan=False))
         return
-    options.console().print(_table(coated))
+    for table in coated.as_tables():
+        options.console().print(table)
     for loss in coated.losses:
         print(f"{loss}; this is the nearest")
     if keep_appearance and not coated.losses:
@@ -60,14 +60,6 @@ def coat(
     else:
         invert.say_for_which(coated.model)
     print(output if output else dumps(coated.stack, "yaml"), end="\n" if output else "")
-
-
-def _diffuse(coated: Coated) -> dict[str, dict[str, list[float]]]:
-    """Energy of a diffuse base, before and after; nothing where there is none."""
-    if coated.diffuse is None:
-        return {}
-    before, after = coated.diffuse
-    return {"diffuse": {"energy_before": before.tolist(), "energy_after": after.tolist()}}
 
 
 def _say_how_kept(stack: Stack, coated: Coated) -> None:
@@ -91,16 +83,3 @@ def _say_how_kept(stack: Stack, coated: Coated) -> None:
         f"Kept by {coated.model.name}; by {DEFAULT}, which renders, energy changes by up to {by['energy']:.4f} "
         f"and alpha by up to {by['alpha']:.4f}: --model {DEFAULT} keeps them by it."
     )
-
-
-def _table(coated: Coated) -> Table:
-    """A row for the coat, one per interface of the bare material, and one for a diffuse base."""
-    title = f"At normal incidence, without and with the coat ({coated.model.name})"
-    table = options.table(title, ["lobe"], ["energy", "with coat", "alpha", "with coat"])
-    own = coated.own()
-    table.add_row("coat", "", options.cell(own["energy"]), "", options.cell(own["alpha"]))
-    for n, row in enumerate(coated.change(), 1):
-        table.add_row(str(n), *(options.cell(row[key]) for key in row))
-    for name, diffuse in _diffuse(coated).items():
-        table.add_row(name, *(options.cell(diffuse[key]) for key in diffuse), "", "")
-    return table

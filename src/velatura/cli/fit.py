@@ -175,11 +175,8 @@ def report(found: Fit, own: ModelError | None = None) -> None:
     print(f"Error of {of}: {found.error:.2g} (from other starts: {_others(found)})")
     if own:
         print(f"Error of {found.model.name} itself beside walks of this stack: {own.error:.2g} (noise {own.noise:.2g})")
-    console.print(_table(found))
-    if found.energies:
-        console.print(_energies(found))
-    if found.estimates:
-        console.print(_parameters(found))
+    for table in found.as_tables():
+        console.print(table)
     for one, two, correlation in found.trades[:MOST]:
         print(f"{one} and {two} trade places (correlation {correlation:+.3f})")
     if len(found.trades) > MOST:
@@ -204,41 +201,11 @@ def _written(layer: Any) -> str:
 
 def draw(rows: ReflectanceTable, found: Fit, title: str, path: Path) -> None:
     """A picture of the table and the fit, written whole or not at all."""
-    from matplotlib.figure import Figure
-
     from velatura import files
-    from velatura.inverse import plots
 
-    figure = Figure(figsize=(13, 9), layout="constrained")
-    plots.draw_fit(figure, rows, found, title)
+    figure = found.plot(rows, title)
     with files.whole(path) as unfinished:
         figure.savefig(unfinished, dpi=110)
-
-
-def _table(found: Fit) -> Any:
-    """A row per angle of incidence."""
-    table = options.table("", [], ["angle of incidence", "f cos, rms", "error, rms", "relative"])
-    for row in found.by_angle:
-        cells = (f"{row['theta_i']:g}°", f"{row['wanted']:.4g}", f"{row['error']:.2g}", f"{row['relative']:.2%}")
-        table.add_row(*cells)
-    return table
-
-
-def _energies(found: Fit) -> Any:
-    """A row per angle of incidence, of the energy of each colour before and after."""
-    table = options.table("Energy that is reflected", ["angle of incidence"], ["before", "after"])
-    for row in found.energies:
-        cells = (" ".join(f"{x:.4f}" for x in row[key]) for key in ("before", "after"))
-        table.add_row(f"{row['theta_i']:g}°", *cells)
-    return table
-
-
-def _parameters(found: Fit) -> Any:
-    """A row per parameter, with its interval."""
-    table = options.table("What the table says of each (95 %)", ["parameter"], ["value", "from", "to"])
-    for one in found.estimates:
-        table.add_row(one.name, *(f"{x:.4g}" for x in (one.value, one.low, one.high)))
-    return table
 
 
 def _others(found: Fit) -> str:

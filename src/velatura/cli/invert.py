@@ -11,10 +11,9 @@ import typer
 
 from velatura.cli import options, progress
 from velatura.errors import InvalidInput, needs
+from velatura.results import cell
 
 if TYPE_CHECKING:
-    from rich.table import Table
-
     from velatura.inverse import Answer, Solution, Target, TargetLobe
     from velatura.model import Model
 
@@ -128,7 +127,8 @@ def invert(
         print(json.dumps(report | ({"stacks": [s.stack.to_dict() for s in found]} if count > 1 else {})))
         return
     for solution in found:
-        options.console().print(_table(solution))
+        for table in solution.as_tables():
+            options.console().print(table)
         for line in _missed(solution):
             print(line)
     say_for_which(found[0].model)
@@ -161,7 +161,7 @@ def _say(found: list[Answer], paths: list[Path], as_json: bool) -> None:
 
 def _described(lobe: TargetLobe) -> str:
     alpha = lobe.axes[:2] if lobe.brushed else lobe.roughness
-    return f"energy {options.cell(lobe.energy)}, alpha {options.cell(alpha)}"
+    return f"energy {cell(lobe.energy)}, alpha {cell(alpha)}"
 
 
 def read(target: str, model: str | None, settings: list[str] | None) -> tuple[Target, str, dict[str, str]]:
@@ -193,23 +193,11 @@ def say_for_which(model: Model) -> None:
 
 def draw_classes(solution: Solution, path: Path) -> None:
     """A picture of every lobe's class, written whole or not at all."""
-    from matplotlib.figure import Figure
-
     from velatura import files
-    from velatura.inverse import plots
 
-    figure = Figure(figsize=(5 * len(solution.classes), 4.8), layout="constrained")
-    figure.suptitle(f"{solution.target.name or path.stem}: what gives each lobe, by {solution.model.name}", wrap=True)
-    layers = iter(solution.layers)
-    for n, (members, lobe) in enumerate(zip(solution.classes, solution.target.lobes), 1):
-        axes = figure.add_subplot(1, len(solution.classes), n, title=f"lobe {n}: {_made_of(lobe)}")
-        plots.draw(axes, members, tuple(next(layers) for _ in range(lobe.interfaces)))
+    figure = solution.plot(solution.target.name or path.stem)
     with files.whole(path) as unfinished:
         figure.savefig(unfinished, dpi=120)
-
-
-def _made_of(lobe: TargetLobe) -> str:
-    return {1: f"one {lobe.base}", 2: f"a pair that ends in a {lobe.base}"}[lobe.interfaces]
 
 
 def _folder(output: Path | None, count: int) -> Path | None:
@@ -255,24 +243,6 @@ def _write(found: Sequence[Solution | Answer], output: Path | None, folder: Path
     return paths
 
 
-def _table(solution: Solution) -> Table:
-    """A row per interface: the medium above it, and its parameters."""
-    title = f"{solution.target.name or 'stack'} ({solution.model.name})"
-    brushed = any(lobe.brushed for lobe in solution.target.lobes)
-    table = options.table(title, ["lobe", ""], ["tau above", "eta", "k", "alpha", *(["rotation"] if brushed else [])])
-    table.columns[1].no_wrap = True
-    layers = iter(zip(solution.layers, solution.stack.interfaces))
-    for n, lobe in enumerate(solution.target.lobes, 1):
-        for k in range(lobe.interfaces):
-            part, written = next(layers)
-            eta = None if part.kind == "mirror" else part.eta
-            values = part.tau, eta, part.kappa, written.alpha, *([written.rotation] if brushed else [])
-            cells = (options.cell(x) for x in values)
-            table.add_row(str(n) if k == 0 else "", part.kind, *cells)
-        table.add_section()
-    return table
-
-
 def _missed(solution: Solution) -> list[str]:
     """A line for each lobe that the stack misses since too much is fixed."""
     from velatura.inverse import Fixed
@@ -284,5 +254,5 @@ def _missed(solution: Solution) -> list[str]:
         asked, has = ((*lobe.colour, *lobe.axes[:2]) for lobe in lobes)
         if max(abs(a - b) for a, b in zip(asked, has)) > SHOWN:
             why = "what is fixed allows no more" if lobes[0].fixed != Fixed() else "none was found that is nearer"
-            lines.append(f"lobe {n}: has energy {options.cell(has[:3])} and alpha {options.cell(has[3:])}; {why}")
+            lines.append(f"lobe {n}: has energy {cell(has[:3])} and alpha {cell(has[3:])}; {why}")
     return lines

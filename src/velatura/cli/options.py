@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -12,7 +11,6 @@ from velatura.errors import InvalidInput
 
 if TYPE_CHECKING:
     from rich.console import Console
-    from rich.table import Table
 
     from velatura.stack import Described
 
@@ -50,25 +48,6 @@ def console() -> Console:
     from rich.console import Console
 
     return Console(markup=False, emoji=False)
-
-
-def table(title: str, left: Sequence[str], right: Sequence[str], **options: Any) -> Table:
-    """An empty table: columns of words, then columns of numbers."""
-    from rich.table import Table
-    from rich.text import Text
-
-    made = Table(*left, title=Text(title) if title else None, title_justify="left", **options)
-    for column in right:
-        made.add_column(column, justify="right")
-    return made
-
-
-def cell(values: Any) -> str:
-    """Numbers in a line, one where they are all alike; a dash for None."""
-    import numpy as np
-
-    numbers = ["-"] if values is None else [f"{x:.4f}" for x in np.ravel(values)]
-    return numbers[0] if len(set(numbers)) == 1 else " ".join(numbers)
 
 
 def read(material: str, settings: list[str] | None) -> tuple[Described, dict[str, Any]]:

@@ -61,11 +61,8 @@ def paint(
     if as_json:
         print(json.dumps(found.to_dict(), allow_nan=False))
         return
-    table = options.table("", ["pigment"], ["concentration"])
-    for name, concentration in zip(found.names, found.concentrations):
-        table.add_row(name, f"{concentration:.4f}")
-    options.console().print(table)
-    print(f"Reached: {options.cell(found.colour)} of linear sRGB, colour difference {found.difference:.2f}")
+    for table in found.as_tables():
+        options.console().print(table)
     print(output if output else dumps(found.stack, "yaml"), end="\n" if output else "")
 
 

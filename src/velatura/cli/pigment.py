@@ -14,8 +14,6 @@ from velatura.cli import options
 if TYPE_CHECKING:
     from velatura.inverse import PigmentFit
 
-ROWS = 16  # that are printed at most
-
 
 def pigment(
     measured: Annotated[
@@ -64,7 +62,8 @@ def pigment(
     if as_json:
         print(json.dumps(_answer(found), allow_nan=False))
         return
-    options.console().print(_table(found))
+    for table in found.brief():
+        options.console().print(table)
     print(f"Reflectances are met within {abs(found.error).max():.2g}")
     if output:
         print(output)
@@ -79,14 +78,3 @@ def _answer(found: PigmentFit) -> dict[str, Any]:
         "error": found.error.tolist(),
         "standard_error": {"K": spread[0], "S": spread[1]},
     }
-
-
-def _table(found: PigmentFit) -> Any:
-    """A row per wavelength, or of some of many."""
-    table = options.table("", ["wavelength"], ["K", "S", "K, of .001", "S, of .001", "Kubelka-Munk K", "S"])
-    step = -(-len(found.K) // ROWS)
-    for n in range(0, len(found.K), step):
-        spread = (f"{x:.1%}" if x < 1 else "open" for x in found.spread[:, n])
-        guess = (f"{x:.4g}" for x in found.guess[:, n])
-        table.add_row(f"{found.wavelengths_nm[n]:g} nm", f"{found.K[n]:.4g}", f"{found.S[n]:.4g}", *spread, *guess)
-    return table

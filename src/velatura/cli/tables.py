@@ -8,6 +8,7 @@ from typing import Annotated, Any
 import typer
 
 from velatura.cli import options, progress
+from velatura.results import Table
 
 
 def tables(
@@ -25,14 +26,9 @@ def tables(
         print(json.dumps(rows, allow_nan=False))
         return
 
-    from rich.table import Table
-
-    table = Table()
-    for column in rows[0]:
-        table.add_column(column.replace("_", " "), justify="left" if column == "table" else "right")
-    for row in rows:
-        table.add_row(*(_cell(name, value) for name, value in row.items()))
-    options.console().print(table)
+    columns = [column.replace("_", " ") for column in rows[0]]
+    texts = [[_cell(name, value) for name, value in row.items()] for row in rows]
+    options.console().print(Table("", columns, texts, [column for column in columns if column != "table"]))
 
 
 def _cell(name: str, value: Any) -> str:

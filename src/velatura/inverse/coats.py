@@ -23,7 +23,7 @@ from velatura.model.papers.adding import lobes
 from velatura.model.papers.prepare import prepare
 from velatura.model.registry import stack_lobes
 from velatura.model.variance import Isotropic, PerAxis, Roughness, Variance
-from velatura.results import Fields
+from velatura.results import Result, Table, cell
 from velatura.stack import (
     Diffuse,
     Film,
@@ -49,7 +49,7 @@ Kept = tuple[tuple[Layer, ...], list[str]]  # layers below a coat, and what thes
 
 
 @dataclass(frozen=True, repr=False)
-class Coated(Fields):
+class Coated(Result):
     """A coated stack, and the lobes at normal incidence without and with the coat: those of the stack come last.
 
     model: by which these are the lobes. diffuse: energy (3,) that a diffuse base scatters back up, without and with the
@@ -80,6 +80,20 @@ class Coated(Fields):
                 }
             )
         return rows
+
+    def change_of_base(self) -> dict[str, list[float]]:
+        """Energy (rgb) that a diffuse base scatters back up, before and after; nothing without one."""
+        return dict(zip(("energy_before", "energy_after"), (x.tolist() for x in self.diffuse or ())))
+
+    def as_tables(self) -> list[Table]:
+        """A row for the coat, one per interface of the bare material, and one for a diffuse base."""
+        own = self.own()
+        rows: list[tuple[str, ...]] = [("coat", "", cell(own["energy"]), "", cell(own["alpha"]))]
+        rows += [(str(n), *(cell(row[key]) for key in row)) for n, row in enumerate(self.change(), 1)]
+        rows += [("diffuse", *map(cell, self.change_of_base().values()))] if self.diffuse else []
+        title = f"At normal incidence, without and with the coat ({self.model.name})"
+        right = ("energy", "with coat", "alpha", "with coat")
+        return [Table(title, ("lobe", *right), rows, right)]
 
 
 def coat(

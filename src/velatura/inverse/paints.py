@@ -17,7 +17,7 @@ from numpy.typing import ArrayLike, NDArray
 from velatura import files, tables
 from velatura.errors import InvalidInput, one_line, within
 from velatura.optics import kubelka_munk
-from velatura.results import Fields
+from velatura.results import Result, Table, cell
 from velatura.stack import (
     Address,
     Described,
@@ -55,6 +55,7 @@ PULL = 1e-3  # towards the first guess, in units of colour difference: decides w
 SAME = 1e-6  # half the square of a colour difference that is none
 FIRM = 1e4  # on the sum of concentrations
 SPECTRAL = 100.0  # of reflectances over wavelength, so that 1 is about one unit of colour difference
+SHOWN = 16  # wavelengths that are printed at most
 NONE = np.zeros(0)  # directions at which the remainder, which has no lobe, is known
 
 
@@ -119,7 +120,7 @@ def paint_colour(material: MaterialLike, specular: bool = False) -> Array:
 
 
 @dataclass(frozen=True, repr=False)
-class PigmentFit(Fields):
+class PigmentFit(Result):
     """K and S of a film, at N wavelengths.
 
     Attributes:
@@ -136,6 +137,20 @@ class PigmentFit(Fields):
     error: Array
     spread: Array
     guess: Array
+
+    def as_tables(self, every: int = 1) -> list[Table]:
+        """A row per wavelength, or of some of them alone."""
+        rows = []
+        for n in range(0, len(self.K), every):
+            spread = (f"{x:.1%}" if x < 1 else "open" for x in self.spread[:, n])
+            guess = (f"{x:.4g}" for x in self.guess[:, n])
+            rows.append((f"{self.wavelengths_nm[n]:g} nm", f"{self.K[n]:.4g}", f"{self.S[n]:.4g}", *spread, *guess))
+        right = ("K", "S", "K, of .001", "S, of .001", "Kubelka-Munk K", "Kubelka-Munk S")
+        return [Table("", ("wavelength", *right), rows, right)]
+
+    def brief(self) -> list[Table]:
+        """A row per wavelength, or of some of many."""
+        return self.as_tables(-(-len(self.K) // SHOWN))
 
     @property
     def pigment(self) -> Pigment:
@@ -314,7 +329,7 @@ def _spread(slopes: Array) -> Array:
 
 
 @dataclass(frozen=True, repr=False)
-class Paint(Fields):
+class Paint(Result):
     """A material whose pigments have the concentrations for a wished colour.
 
     Attributes:
@@ -333,6 +348,12 @@ class Paint(Fields):
     reached: Array
     colour: Array
     difference: float
+
+    def as_tables(self) -> list[Table]:
+        """A row per pigment, and the colour that is reached."""
+        rows: list[tuple[str, str] | None] = [(name, f"{x:.4f}") for name, x in zip(self.names, self.concentrations)]
+        rows += [None, ("linear sRGB reached", cell(self.colour)), ("colour difference", f"{self.difference:.2f}")]
+        return [Table("", ("pigment", "concentration"), rows, ("concentration",))]
 
     def to_dict(self) -> dict[str, Any]:
         """The numbers in the types of JSON."""

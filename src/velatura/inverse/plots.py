@@ -10,11 +10,14 @@ import numpy as np
 
 from velatura.errors import needs
 from velatura.inverse.fitting.angles import ReflectanceTable, evenly, grouped, table_of
-from velatura.inverse.fitting.descent import Fit
 
-if TYPE_CHECKING:  # a class draws itself
+if TYPE_CHECKING:  # they draw themselves
+    from matplotlib.figure import Figure
+
+    from velatura.inverse.fitting.descent import Fit
     from velatura.inverse.lobes.equivalence import Coordinate, EquivalenceClass
     from velatura.inverse.lobes.partial_stack import Layers
+    from velatura.inverse.solution import Solution
 
 RESOLUTION = 256
 PANELS, PAIRS = 6, 12  # angles of incidence, and correlations, that are drawn of a fit
@@ -32,18 +35,31 @@ STAR: dict[str, Any] = {
 }
 
 
-def png(members: EquivalenceClass) -> bytes:
-    """A class as a picture, with its preferred member. Raises MissingTool without the extra `plots`."""
+def new_figure(width: float, height: float) -> Figure:
+    """A figure of so many inches, of no window. Raises MissingTool without the extra `plots`."""
     with needs("plots"):
-        from matplotlib.backends.backend_agg import FigureCanvasAgg
         from matplotlib.figure import Figure
 
-    figure = Figure(figsize=SIZE, dpi=DPI, layout="constrained")
-    FigureCanvasAgg(figure)
+    return Figure(figsize=(width, height), layout="constrained")
+
+
+def png(members: EquivalenceClass) -> bytes:
+    """A class as a picture, with its preferred member. Raises MissingTool without the extra `plots`."""
+    figure = new_figure(*SIZE)
     draw(figure.add_subplot(), members, members.chosen)
     picture = io.BytesIO()
-    figure.savefig(picture)
+    figure.savefig(picture, dpi=DPI, format="png")
     return picture.getvalue()
+
+
+def draw_classes(figure: Figure, solution: Solution, title: str) -> None:
+    """The class of every lobe, side by side, with what is chosen of each."""
+    figure.suptitle(f"{title}: what gives each lobe, by {solution.model.name}", wrap=True)
+    layers = iter(solution.layers)
+    for n, (members, lobe) in enumerate(zip(solution.classes, solution.target.lobes), 1):
+        made_of = {1: f"one {lobe.base}", 2: f"a pair that ends in a {lobe.base}"}[lobe.interfaces]
+        axes = figure.add_subplot(1, len(solution.classes), n, title=f"lobe {n}: {made_of}")
+        draw(axes, members, tuple(next(layers) for _ in range(lobe.interfaces)))
 
 
 def draw(axes: Any, members: EquivalenceClass, chosen: tuple[Layers, ...] | None = None) -> None:

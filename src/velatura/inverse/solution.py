@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -16,15 +17,18 @@ from velatura.inverse.lobes.target import Target
 from velatura.inverse.local.dragged import seen
 from velatura.model import Model
 from velatura.ops import Value
-from velatura.results import Fields
+from velatura.results import Result, Table, cell
 from velatura.stack import Stack
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 EFFORTS = ((12, 32), (24, 128), (64, 512))  # indices tried between the interfaces of a pair, and partial stacks kept
 ALIKE = 1e-4  # by which the values of two stacks differ at least
 
 
 @dataclass(frozen=True, repr=False)
-class Solution(Fields):
+class Solution(Result):
     """A stack with the lobes of a target, and the classes that its parts are chosen from.
 
     reached: the lobes of the stack, where these miss the target by more than rounding since so much is fixed.
@@ -41,6 +45,36 @@ class Solution(Fields):
         axes = [lobe.axes.rotation for lobe in self.target.lobes for _ in range(lobe.interfaces)]
         written = [layer for layers, axis in zip(self.layers, axes) for layer in layers.written(0, axis)]
         return Stack(written, name=self.target.name, exterior=self.target.exterior)
+
+    def as_tables(self) -> list[Table]:
+        """A row per interface: its lobe, the medium above it, and its parameters."""
+        brushed = any(lobe.brushed for lobe in self.target.lobes)
+        right = ("tau above", "eta", "k", "alpha", *(["rotation"] if brushed else []))
+        rows: list[tuple[str, ...] | None] = []
+        layers = iter(zip(self.layers, self.stack.interfaces))
+        for n, lobe in enumerate(self.target.lobes, 1):
+            for k in range(lobe.interfaces):
+                part, written = next(layers)
+                eta = None if part.kind == "mirror" else part.eta
+                values = part.tau, eta, part.kappa, written.alpha, *([written.rotation] if brushed else [])
+                rows.append((str(n) if k == 0 else "", part.kind, *map(cell, values)))
+            rows.append(None)
+        return [Table(f"{self.target.name or 'stack'} ({self.model.name})", ("lobe", "", *right), rows, right)]
+
+    def plot(self, title: str = "", figure: Figure | None = None) -> Figure:
+        """The class of every lobe, with what is chosen of it.
+
+        Args:
+            figure: one of Matplotlib's to draw on, a new one by default.
+
+        Raises:
+            MissingTool: the extra `plots` is not installed.
+        """
+        from velatura.inverse import plots
+
+        figure = figure or plots.new_figure(5 * len(self.classes), 4.8)
+        plots.draw_classes(figure, self, title or self.target.name or "stack")
+        return figure
 
     def alike(self, other: Solution) -> bool:
         """Whether another stack of the same form has almost the same values."""

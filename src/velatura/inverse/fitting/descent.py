@@ -11,7 +11,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from itertools import combinations
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -25,7 +25,7 @@ from velatura.inverse.local.approach import Secants
 from velatura.model import Model, named, variance_kind
 from velatura.model.papers import bsdf
 from velatura.ops import Value
-from velatura.results import Fields
+from velatura.results import Result, Table
 from velatura.stack import (
     Material,
     MaterialLike,
@@ -33,6 +33,9 @@ from velatura.stack import (
     as_described,
     single,
 )
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 STEP, STRIDE = 1e-5, 1e-3  # of a value, to see how a model changes: in closed form, and solved anew for each value
 MAPPED = 3  # readings by a model without a closed form, between descents of the one that stands in for it
@@ -75,7 +78,7 @@ class Other:
 
 
 @dataclass(frozen=True, repr=False)
-class Fit(Fields):
+class Fit(Result):
     """A stack that approximates a table, and its error.
 
     error: root mean square of the difference of log(1 + f cos theta_o); of a simplification together with ten times
@@ -108,6 +111,45 @@ class Fit(Fields):
             "trades": [{"between": list(pair), "correlation": r} for *pair, r in self.trades],
             "others": [{"stack": other.stack.to_dict(), "error": other.error} for other in self.others],
         }
+
+    def as_tables(self) -> list[Table]:
+        """Rows of angles of incidence with their errors, and of parameters with their intervals; of a simplification
+        also of energies before and after."""
+        columns = ("angle of incidence", "f cos, rms", "error, rms", "relative")
+        rows = [
+            (f"{row['theta_i']:g}°", f"{row['wanted']:.4g}", f"{row['error']:.2g}", f"{row['relative']:.2%}")
+            for row in self.by_angle
+        ]
+        title = f"{self.stack.name or 'stack'} ({self.model.name}), error {self.error:.2g}"
+        tables = [Table(title, columns, rows, columns)]
+        if self.energies:
+            energies = [
+                (f"{row['theta_i']:g}°", *(" ".join(f"{x:.4f}" for x in row[key]) for key in ("before", "after")))
+                for row in self.energies
+            ]
+            right = ("before", "after")
+            tables.append(Table("Energy that is reflected", ("angle of incidence", *right), energies, right))
+        if self.estimates:
+            estimates = [(one.name, *(f"{x:.4g}" for x in (one.value, one.low, one.high))) for one in self.estimates]
+            ends = ("value", "from", "to")
+            tables.append(Table("What the table says of each (95 %)", ("parameter", *ends), estimates, ends))
+        return tables
+
+    def plot(self, table: ReflectanceTable, title: str = "", figure: Figure | None = None) -> Figure:
+        """The stack beside the table that it approximates, at some angles of incidence; below the intervals of its
+        parameters and their correlations, or the energies of a simplification.
+
+        Args:
+            figure: one of Matplotlib's to draw on, a new one by default.
+
+        Raises:
+            MissingTool: the extra `plots` is not installed.
+        """
+        from velatura.inverse import plots
+
+        figure = figure or plots.new_figure(13, 9)
+        plots.draw_fit(figure, table, self, title or self.stack.name or "fit")
+        return figure
 
 
 def fit(
