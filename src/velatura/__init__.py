@@ -30,7 +30,7 @@ if TYPE_CHECKING:
     from velatura.api import bsdf, check, lobes, register, render
     from velatura.comparison import compare
     from velatura.editor.widget import Editor as Editor
-    from velatura.errors import InvalidInput, LawBroken, MissingTool, NoSolution, VelaturaError
+    from velatura.errors import InvalidInput, LawBroken, MissingTool, NoSolution, VelaturaError, VelaturaWarning
     from velatura.exports import export
     from velatura.imports import from_gltf, from_openpbr, from_principled, from_standard_surface
     from velatura.model import MODELS, Model
@@ -57,7 +57,7 @@ _HOMES = {
     "velatura.api": ("bsdf", "check", "lobes", "register", "render"),
     "velatura.comparison": ("compare",),
     "velatura.editor.widget": ("Editor",),
-    "velatura.errors": ("InvalidInput", "LawBroken", "MissingTool", "NoSolution", "VelaturaError"),
+    "velatura.errors": ("InvalidInput", "LawBroken", "MissingTool", "NoSolution", "VelaturaError", "VelaturaWarning"),
     "velatura.exports": ("export",),
     "velatura.imports": ("from_gltf", "from_openpbr", "from_principled", "from_standard_surface"),
     "velatura.model": ("MODELS", "Model"),
@@ -103,6 +103,7 @@ __all__ = [
     "Substance",
     "Texture",
     "VelaturaError",
+    "VelaturaWarning",
     "bsdf",
     "check",
     "compare",

@@ -6,9 +6,11 @@ Every message is one line that a user can act on: it names the file, the layer, 
 from __future__ import annotations
 
 import contextlib
+import operator
 import re
 import sys
 from collections.abc import Iterator
+from typing import SupportsIndex
 
 MOST = 2000  # characters of a line
 
@@ -78,8 +80,23 @@ class Incomplete(VelaturaWarning):
     """A material of another program of which a stack cannot carry all."""
 
 
+class OutOfRange(VelaturaWarning):
+    """A value that is set through Mitsuba and lies outside its range: the nearest one stands for it."""
+
+
 class Damaged(VelaturaWarning):
     """A store of a sweep whose files are not as they were written."""
+
+
+def whole_number(name: str, value: SupportsIndex, least: int = 0) -> int:
+    """A count or a seed. Raises InvalidInput unless it is a whole number of at least so much."""
+    try:
+        number = operator.index(value)
+    except TypeError:
+        number = least - 1
+    if number < least or isinstance(value, bool):
+        raise InvalidInput(f"{name}: must be a whole number of at least {least}, got {short(repr(value), 60)}")
+    return number
 
 
 @contextlib.contextmanager

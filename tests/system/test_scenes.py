@@ -255,7 +255,11 @@ def test_an_environment_file_lights_the_scene(ending: str, tmp_path: Path, mi: A
         ({"env": "nowhere.hdr"}, "nowhere.hdr: no such environment file"),
         ({"env": f"{'x' * 300}.hdr"}, "no such environment file"),
         ({"env": ""}, "unknown environment"),
-        ({"spp": 0}, "spp is 0"),
+        ({"spp": 0}, "spp: must be a whole number of at least 1, got 0"),
+        ({"spp": 1.5}, "spp: must be a whole number of at least 1, got 1.5"),
+        ({"seed": -1}, "seed: must be a whole number of at least 0, got -1"),
+        ({"scene": 3}, "unknown scene 3"),
+        ({"env": 3}, "unknown environment"),
     ],
 )
 def test_what_cannot_be_rendered_is_refused_in_one_line(asked: dict[str, Any], says: str) -> None:

@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+import ast
+import re
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
-from typing_extensions import assert_type
+from typing_extensions import assert_type, deprecated
 
 import velatura as vt
 from velatura.model.lobe_statistics import StackLobes
@@ -110,6 +112,55 @@ def test_what_is_offered_has_types() -> None:
     assert_type(vt.lobes("coated-gold", 1.0), StackLobes | Any)
     assert_type(vt.load("coated-gold"), vt.Stack | Any)
     assert_type(vt.inverse.coat("coated-gold"), vt.inverse.Coated)
+
+
+REFUSED: dict[str, Callable[[], object]] = {
+    "count of stacks": lambda: vt.inverse.alternatives([{"energy": 0.04}], 0),
+    "count that is no number": lambda: vt.inverse.alternatives([{"energy": 0.04}], "many"),
+    "interfaces": lambda: vt.inverse.simplify("coated-gold", "few"),  # type: ignore[call-overload]
+    "paths": lambda: vt.compare("coated-gold", ["belcour2018"], paths=1.5),
+    "walks": lambda: vt.reference.statistics("coated-gold", 1.0, paths="many"),  # type: ignore[call-overload]
+    "BSDF": lambda: vt.check(3),
+    "changed record": lambda: setattr(vt.preset("coated-gold").layers[0], "eta", 2.0),
+    "unknown switch": lambda: vt.lobes("coated-gold", 1.0, nosuch="x"),
+    "unknown model": lambda: vt.bsdf("coated-gold", "nosuch"),
+}
+
+
+@pytest.mark.parametrize("what", REFUSED)
+def test_every_refusal_is_an_error_of_ours_in_one_line(what: str) -> None:
+    with pytest.raises(vt.VelaturaError) as caught:
+        REFUSED[what]()
+    assert str(caught.value) and "\n" not in str(caught.value)
+
+
+def test_the_library_prints_nothing() -> None:
+    """But for the command line, the server that it starts, and progress on terminals."""
+    speaks = {"cli", "editor/server.py", "plugins/progress.py"}
+    source = Path(vt.__file__).parent
+    for path in source.rglob("*.py"):
+        text = path.read_text(encoding="utf-8")
+        name = path.relative_to(source).as_posix()
+        if "print(" in text and not {name, name.split("/")[0]} & speaks:
+            called = (node.func for node in ast.walk(ast.parse(text)) if isinstance(node, ast.Call))
+            assert not any(isinstance(each, ast.Name) and each.id == "print" for each in called), name
+
+
+DEPRECATED = re.compile(r"is deprecated since \d+\.\d+ and goes in \d+\.\d+; write \S")
+
+
+def test_what_is_deprecated_says_what_to_write() -> None:
+    """Expected, as the manual promises: the message has this form, here of an example, and in all sources."""
+
+    @deprecated("vt.old is deprecated since 0.2 and goes in 0.3; write vt.new")
+    def old() -> int:
+        return 3
+
+    with pytest.warns(DeprecationWarning, match=DEPRECATED):
+        assert old() == 3
+    for path in Path(vt.__file__).parent.rglob("*.py"):
+        for message in re.findall(r'@deprecated\("([^"]*)"\)', path.read_text(encoding="utf-8")):
+            assert DEPRECATED.search(message), path
 
 
 def test_every_public_name_is_there() -> None:

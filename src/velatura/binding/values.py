@@ -11,7 +11,7 @@ import numpy as np
 from velatura import kernel
 from velatura.binding import properties as properties_of
 from velatura.binding.textures import Range
-from velatura.errors import InvalidInput
+from velatura.errors import InvalidInput, OutOfRange
 from velatura.stack import Address
 
 
@@ -89,7 +89,7 @@ class Values:
                 raise InvalidInput(refusal) from None
             if name not in self.clamped:
                 self.clamped.add(name)
-                warnings.warn(f"{refusal}; the nearest value that is allowed stands for it", stacklevel=2)
+                warnings.warn(f"{refusal}; the nearest value that is allowed stands for it", OutOfRange, stacklevel=2)
             return dr.replace_grad(dr.clip(value, *declared.within), value)
         return value
 

@@ -12,7 +12,7 @@ from velatura.checks.laws import LAWS, Law
 from velatura.checks.plots import check_folder, save
 from velatura.checks.probe import Probe
 from velatura.checks.report import Finding, Report
-from velatura.errors import InvalidInput
+from velatura.errors import InvalidInput, short
 
 __all__ = ["FALSE_ALARMS", "LAWS", "Finding", "Law", "Report", "check"]
 
@@ -49,8 +49,10 @@ def check(
         progress: called with (steps done, all steps) now and then.
 
     Raises:
-        InvalidInput: an exception that is no law, a scalar variant, a folder that cannot be written.
+        InvalidInput: no BSDF, an exception that is no law, a scalar variant, a folder that cannot be written.
     """
+    if not hasattr(bsdf, "flags"):
+        raise InvalidInput(f"must be a BSDF of Mitsuba's, or a material, got {short(repr(bsdf), 60)}")
     declared = {*exceptions, *getattr(bsdf, "exceptions", ())}
     unknown = sorted(declared - {law.name for law in LAWS})
     if unknown:

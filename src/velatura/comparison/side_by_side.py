@@ -14,7 +14,7 @@ from velatura.comparison.pictures import pictures as spheres
 from velatura.comparison.plugins import Plugin
 from velatura.comparison.result import UNPOLARISED, Account, Comparison
 from velatura.comparison.truth import truth as walked
-from velatura.errors import InvalidInput
+from velatura.errors import InvalidInput, whole_number
 from velatura.model import MODELS, Model, named
 from velatura.stack import Described, MaterialLike, load
 
@@ -65,8 +65,7 @@ def compare(
     asked = _every(switches) if models is None else [_model(m, switches) for m in models]
     if microsurface is None:
         microsurface = any(isinstance(m, Model) and m.microsurface for m in asked)
-    if paths < 2:
-        raise InvalidInput(f"paths: must be at least 2, got {paths}")
+    paths = whole_number("paths", paths, 2)
     if polarised and pictures:
         raise InvalidInput("pictures: not with polarised, since they are rendered without polarisation")
     names = _names(asked, polarised)

@@ -15,7 +15,7 @@ from typing import Any
 
 import numpy as np
 
-from velatura.errors import InvalidInput
+from velatura.errors import InvalidInput, whole_number
 from velatura.inverse.fitting.free_values import Free, FreeValues
 from velatura.inverse.fitting.simplify import first_stacks, with_media
 from velatura.inverse.invert import alternatives, invert_stack, model_of
@@ -111,7 +111,7 @@ def answers(
 ) -> list[Answer]:
     """The answer, and others that meet the wish as well or less, the nearest first: other stacks with the lobes, and
     other thicknesses of a film. Raises as `answer`."""
-    wanted = read(target)
+    wanted, count = read(target), whole_number("count", count, 1)
     chosen = model_of(wanted, model, **switches)
     if not wanted.beyond_lobes:
         return [Answer(one.stack, wanted, chosen, 0.0) for one in alternatives(wanted, count, chosen, seed)]

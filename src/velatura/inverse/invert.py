@@ -7,6 +7,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from velatura.errors import whole_number
 from velatura.inverse import refined
 from velatura.inverse.explain import infeasible
 from velatura.inverse.lobes import sampling
@@ -95,6 +96,7 @@ def alternatives(
     Raises:
         InvalidInput, Infeasible: as `invert_stack`.
     """
+    count = whole_number("count", count, 1)
     first = invert_stack(target, model, **switches)
     rng, found = np.random.default_rng(seed), [first]
     near = first.in_closed_form

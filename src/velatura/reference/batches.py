@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from velatura import kernel
-from velatura.errors import InvalidInput
+from velatura.errors import whole_number
 from velatura.optics.polarisation import horizontal
 from velatura.reference.layers import WalkedLayers, from_material, zeros
 from velatura.reference.walk import walk
@@ -58,8 +58,7 @@ def trace(
         InvalidInput: the stack holds a texture, or there are no paths.
         MissingTool: LLVM is missing or too old.
     """
-    if paths < 1:
-        raise InvalidInput(f"paths: must be at least 1, got {paths}")
+    paths = whole_number("paths", paths, 1)
     kernel.require_llvm()
     layers = _layers(stack, microsurface)
     for start in range(0, paths, _AT_ONCE):

@@ -67,7 +67,7 @@ def _picture(mi: Any, env: str | os.PathLike[str]) -> Any:
     if env in PHOTOGRAPHS:
         # They were made smaller with a filter that overshoots below 0
         return mi.Bitmap(np.maximum(_rgb(mi, PHOTOGRAPHS[str(env)]), 0.0))
-    return _read(mi, Path(env))
+    return _read(mi, Path(str(env)))
 
 
 def _read(mi: Any, path: Path) -> Any:

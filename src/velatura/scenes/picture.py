@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from velatura import files, kernel
-from velatura.errors import InvalidInput
+from velatura.errors import whole_number
 from velatura.scenes.stage import Name, Size, blamed, scene_dict
 
 #: Samples (pixels x spp) of one pass: between two of them progress is reported and an interrupt is handled.
@@ -37,11 +37,10 @@ def render(
         progress: called after every pass with (samples per pixel done, spp).
 
     Raises:
-        InvalidInput, MissingTool: as `scene_dict`; also for spp < 1.
+        InvalidInput, MissingTool: as `scene_dict`; also for spp < 1, or a seed that is no whole number.
         KeyboardInterrupt: on Ctrl-C, between two passes or within one.
     """
-    if spp < 1:
-        raise InvalidInput(f"spp is {spp}, and must be at least 1")
+    spp, seed = whole_number("spp", spp, 1), whole_number("seed", seed)
     mi = kernel.mitsuba()
     described = scene_dict(scene, env, bsdf, size, zoom)  # kept to the end, as it owns the parts of a scene file
     with blamed(scene):

@@ -88,7 +88,7 @@ def width_and_height(size: Any, name: str = "size") -> tuple[int, int]:
 
 def is_file(scene: Name) -> bool:
     """Whether a scene is a Mitsuba scene file."""
-    return Path(scene).suffix.lower() == ".xml"
+    return isinstance(scene, str | os.PathLike) and Path(scene).suffix.lower() == ".xml"
 
 
 @contextlib.contextmanager

@@ -13,7 +13,7 @@ from typing import Any, overload
 
 import numpy as np
 
-from velatura.errors import InvalidInput, within
+from velatura.errors import InvalidInput, whole_number, within
 from velatura.inverse.fitting import angles
 from velatura.inverse.fitting.angles import Directions, ReflectanceTable
 from velatura.inverse.fitting.descent import Descent, End, Fit, descended, fit
@@ -168,7 +168,7 @@ def _simplified(stack: Stack, interfaces: int, chosen: Model, eta_max: float) ->
     count = len(stack.interfaces)
     if count == 1:
         raise InvalidInput("interfaces: the material has one, and none can have fewer")
-    if not 1 <= interfaces < count:
+    if not 1 <= whole_number("interfaces", interfaces) < count:
         raise InvalidInput(
             f"interfaces: must be at least 1, and fewer than the {count} that there are, got {interfaces}"
         )
