@@ -284,3 +284,19 @@ def test_media_that_scatter_are_walked_in_monochromatic_variants() -> None:
         kernel.mitsuba("llvm_ad_rgb")
     (mono, mono_error), (rgb, rgb_error) = found
     assert np.all(np.abs(mono - rgb) < SIGMAS * np.hypot(mono_error, rgb_error))
+
+
+def test_media_that_scatter_are_walked_in_scalar_variants() -> None:
+    """Expected: the same walk, of the same random numbers."""
+    found = []
+    try:
+        for variant in ("scalar_rgb", "llvm_ad_rgb"):
+            kernel.mitsuba(variant)
+            kernel.register()
+            si = dr.zeros(mi.SurfaceInteraction3f)
+            si.wi = mi.Vector3f(0.6, 0.0, 0.8)
+            value = reference(STACKS["cloudy pane"]).eval(mi.BSDFContext(), si, mi.Vector3f(0.0, 0.6, 0.8))
+            found.append(np.array(value).ravel())
+    finally:
+        kernel.mitsuba("llvm_ad_rgb")
+    assert np.all(found[0] > 0) and np.allclose(*found, rtol=1e-3)

@@ -20,7 +20,7 @@ from velatura.reference import events, facets
 from velatura.reference.events import SurfaceMeeting
 from velatura.reference.facets import UP
 from velatura.reference.layers import WalkedLayers, pick
-from velatura.reference.metal import mean
+from velatura.reference.metal import is_colour, mean
 from velatura.reference.next_event import WayOut, connect_medium, connect_surface, way_up
 
 ROULETTE = 0.25  # a path that carries less than this survives by chance, and carries this then
@@ -211,7 +211,7 @@ def _of_one_channel(u: Value, carried: Value, colour: Value) -> Value:
     """The channel of `colour` that u falls on, the channels being as likely as the path carries them."""
     import drjit as dr
 
-    if dr.depth_v(colour) < 2:  # a number for all channels
+    if not is_colour(colour):  # a number for all channels
         return colour
     chosen, end = colour[0], carried[0]
     for i in range(1, len(colour)):
