@@ -86,7 +86,7 @@ def test_tinted_lacquer_on_brushed_gold(page: Visit) -> None:
     hands.type(hands.field(2, "Roughness v"), "0.4")
     made = hands.made()
     assert made.kinds == ("dielectric", "medium", "conductor")
-    assert made.layers[2].alpha == (0.1, 0.4)
+    assert made.interfaces[1].alpha == (0.1, 0.4)
 
 
 def test_car_paint(page: Visit) -> None:
@@ -99,7 +99,7 @@ def test_car_paint(page: Visit) -> None:
     hands.click(hands.layers.nth(0).get_by_text("Roughness", exact=True), click_count=2)
     made = hands.made()
     assert made.kinds == ("dielectric", "medium", "conductor")
-    assert (made.layers[0].alpha, made.layers[2].alpha) == (0, 0.35)
+    assert (made.interfaces[0].alpha, made.interfaces[1].alpha) == (0, 0.35)
 
 
 def test_frosted_pane(page: Visit) -> None:

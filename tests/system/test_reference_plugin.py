@@ -299,4 +299,4 @@ def test_media_that_scatter_are_walked_in_scalar_variants() -> None:
             found.append(np.array(value).ravel())
     finally:
         kernel.mitsuba("llvm_ad_rgb")
-    assert np.all(found[0] > 0) and np.allclose(*found, rtol=1e-3)
+    assert np.all(found[0] > 0) and np.allclose(found[0], found[1], rtol=1e-3)
