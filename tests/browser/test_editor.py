@@ -1328,10 +1328,18 @@ def test_axe_finds_nothing_serious(visit: Open, scheme: str) -> None:
     for tab in ("Disc", "Energy", "Blur", "Validations"):
         page.page.get_by_role("tab", name=tab, exact=True).click()
         look(tab)
-    for button in ("Open", "Save as", "Export"):
+    for button in ("Open", "Save as", "Export", "Render"):
         page.page.get_by_role("button", name=button, exact=True).click()
+        if button == "Export":
+            page.page.get_by_label("Format", exact=True).select_option("gltf")
+            page.page.locator("dialog.export .loss").wait_for()
         look(button)
         page.page.keyboard.press("Escape")
+    page.page.get_by_label("Find a parameter").fill("rough")
+    look("found")
+    page.page.get_by_label("Find a parameter").fill("")
+    page.page.get_by_role("button", name="Fold all layers").click()
+    look("folded")
     page.page.get_by_role("tab", name="Appearance").click()
     look("appearance")
     assert found == []

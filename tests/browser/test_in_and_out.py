@@ -233,3 +233,33 @@ def test_options_of_the_command_line_are_controls_of_the_formats_that_take_them(
     dialog.get_by_label("Prefix").fill("no name")
     dialog.get_by_label("Prefix").press("Enter")
     dialog.locator(".problem").get_by_text("prefix").wait_for()
+
+
+# Light ---------------------------------------------------------------------------------------------------------------
+
+
+def test_light_of_ones_own_is_dropped_and_turned_on_the_picture(visit: Open, tmp_path: Path) -> None:
+    """Expected: a drag with Shift turns the light and not the camera, in one step; .005 rad a pixel."""
+    page = visit()
+    light = np.full((8, 16, 3), 0.2, np.float32)
+    light[2:4, 3:5] = 20
+    vt.scenes.write_image(light, tmp_path / "lamp.exr")
+    drop(page, ("lamp.exr", (tmp_path / "lamp.exr").read_bytes()))
+    page.page.wait_for_function("() => velatura.store.get().view.environment === 'file:lamp.exr'")
+    before = page.picture()
+    picture = page.page.locator("canvas").first.bounding_box()
+    x, y = picture["x"] + picture["width"] / 2, picture["y"] + picture["height"] / 2
+    page.page.keyboard.down("Shift")
+    page.page.mouse.move(x, y)
+    page.page.mouse.down()
+    page.page.mouse.move(x + 100, y, steps=5)
+    page.page.mouse.up()
+    page.page.keyboard.up("Shift")
+    assert page.state("view.rotation") == pytest.approx(np.degrees(0.5), abs=0.5)
+    assert page.state("camera") is None
+    assert np.abs(page.picture() - before).mean() > 0.5
+    page.page.keyboard.press("Control+z")
+    assert page.state("view.rotation") == 0
+    page.page.locator("canvas").first.press("Shift+ArrowRight")
+    assert page.state("view.rotation") == pytest.approx(np.degrees(0.1), abs=0.1)
+    page.settled()

@@ -155,6 +155,11 @@ export function mount(root, { call, lacks = nothingLacks, live, session, storage
     update();
   });
   viewport.onCamera((camera) => store.aside(commands.setCamera, camera));
+  viewport.onTurn((degrees) => {
+    const { rotation } = store.get().view, turned = Math.round(10 * (rotation + degrees)) / 10;
+    edits.drag('view.rotation', commands.setView, { rotation: turned - 360 * Math.floor((turned + 180) / 360) });
+    edits.settle();
+  });
   const stopListening = live?.onChange((online) => {
     if (online) {
       messages.forgiveAll('away');
@@ -262,7 +267,7 @@ function createSignal(window) {
 
 function canvasOf(document) {
   const canvas = document.createElement('canvas');
-  canvas.setAttribute('aria-label', 'The material on an object; arrow keys turn it, plus and minus come closer');
+  canvas.setAttribute('aria-label', 'The material on an object; arrow keys turn it, with Shift the light; plus and minus come closer');
   canvas.setAttribute('role', 'img');
   return canvas;
 }

@@ -47,8 +47,11 @@ export function orbited({ origin, target, fov }, azimuth, elevation, distance = 
   };
 }
 
-/** Calls `move(azimuth, elevation, distance)` for what hands do on a canvas, and `begin` and `end` around it. */
-export function listen(canvas, { move, begin, end }, signal) {
+/**
+ * Calls `move(azimuth, elevation, distance)` for what hands do on a canvas, with Shift `turn(azimuth)` of the light, and `begin` and
+ * `end` around it.
+ */
+export function listen(canvas, { move, turn, begin, end }, signal) {
   const on = (name, act) => canvas.addEventListener(name, act, { signal, passive: false });
   const fingers = new Map();
   const spread = () => {
@@ -68,7 +71,8 @@ export function listen(canvas, { move, begin, end }, signal) {
     if (!before) return;
     const apart = fingers.size === 2 ? spread() : 0;
     fingers.set(event.pointerId, { x: event.clientX, y: event.clientY });
-    if (fingers.size === 1) move(TURN * (before.x - event.clientX), TURN * (before.y - event.clientY), 1);
+    if (fingers.size === 1 && event.shiftKey) turn(TURN * (event.clientX - before.x));
+    else if (fingers.size === 1) move(TURN * (before.x - event.clientX), TURN * (before.y - event.clientY), 1);
     else if (fingers.size === 2) move(0, 0, apart / Math.max(spread(), 1));
   });
   const leave = (event) => {
@@ -84,7 +88,8 @@ export function listen(canvas, { move, begin, end }, signal) {
     const step = KEYS[event.key];
     if (!step || event.ctrlKey || event.metaKey || event.altKey) return;
     event.preventDefault();
-    move(...step);
+    if (event.shiftKey && step[0]) turn(step[0]);
+    else move(...step);
   });
 }
 

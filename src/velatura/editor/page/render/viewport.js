@@ -43,6 +43,7 @@ export class Viewport {
   #services;
   #onError;
   #listeners = new Set(); // to the camera
+  #turners = new Set(); // of the light
   #stopped = new AbortController();
   #bands = new Bands();
   #slice = null; // of paths that the device is at work on
@@ -149,6 +150,11 @@ export class Viewport {
   onCamera(f) {
     this.#listeners.add(f);
     return () => this.#listeners.delete(f);
+  }
+
+  /** Calls f with the degrees that hands turn the light by. */
+  onTurn(f) {
+    this.#turners.add(f);
   }
 
   setBudget(budget) {
@@ -448,7 +454,8 @@ export class Viewport {
       this.setCamera(orbited(this.camera, ...by));
       this.#listeners.forEach((f) => f(this.camera));
     };
-    listen(canvas, { move: orbit, begin: () => this.moving(true), end: () => this.moving(false) }, signal);
+    const turn = (azimuth) => this.#turners.forEach((f) => f((180 * azimuth) / Math.PI));
+    listen(canvas, { move: orbit, turn, begin: () => this.moving(true), end: () => this.moving(false) }, signal);
 
     const fit = new ResizeObserver(() => {
       const { clientWidth, clientHeight } = canvas;
