@@ -15,6 +15,7 @@ TARGET_SAMPLE_WEIGHT = 2.7  # weight of samples of a part, where they can be kep
 KEPT = 0.7  # of the share by its energy that a part keeps at least
 STEPS = 8  # of halving
 EVENED = 16  # steps by which they are shared anew
+BEGUN = 0.1  # share of samples that all parts have alike, as steps begin
 HEAVY = 6  # power of the weights of samples, in their mean
 PLACES = 11  # between the chances that were and those
 BEYOND = 10.0  # variance that is as bad as a weight beyond the target
@@ -88,7 +89,8 @@ def evened(values: Array, kept: Array, densities: Array, chances: Array) -> Arra
         whole = kept + (found[..., None] * densities).sum(axis=0)
         return ops.divide(values, whole), whole
 
-    found, total = chances, chances.sum(axis=0)
+    total = chances.sum(axis=0)
+    found = (1 - BEGUN) * chances + BEGUN * total / len(chances)
     for _ in range(EVENED):
         weight, whole = weights(found)
         heavy = reduce(np.multiply, [weight] * HEAVY)  # a tenth of the time of a power

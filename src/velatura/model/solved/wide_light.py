@@ -94,8 +94,8 @@ def _forward(numbers: Array, i: Direction) -> Array:
 
 
 def shared(found: Columns, shares: Array, view: View, folded: Folded | Listed) -> Columns:
-    """Columns with samples of what passes, and of the remainder, shared anew, as far as light is wide, by `shares`
-    (M,); what light from directions sees is in `view`."""
+    """Columns with samples of what passes, and of the remainder, shared anew, lobes included, as far as light is wide,
+    by `shares` (M,); what light from directions sees is in `view`."""
     passes = found.passes
     assert passes
     # Azimuths hardly matter where light is wide
@@ -112,16 +112,18 @@ def shared(found: Columns, shares: Array, view: View, folded: Folded | Listed) -
     mirrored = alone["of_straight"] * direct.eval_pdf(of.transmission, i, (x, y, z))[1]
     values = sum(value for value, _ in parts), through
     kept = sum(chance * density for chance, (_, density) in zip(of.columns.chances, parts)), 0 * z
-    densities = [(parts[-1][1], 0 * z), *zip(mirrored, passed)]
+    densities = [*((density, 0 * z) for _, density in parts), *zip(mirrored, passed)]
 
     def both(above: Array, below: Array) -> Array:
         return np.concatenate([np.reshape(values, (len(first), -1)) for values in (above, below)], axis=-1)
 
     wanted = both(*(np.reshape(value, (-1, len(z))).max(axis=0) for value in values))
-    before = np.array([found.chance, *(getattr(passes, name) for name in Parts.CHANCES)])
+    # Lobes may have more samples, not less: they may be narrower than directions are dense
+    others = [found.chance, *(getattr(passes, name) for name in Parts.CHANCES)]
+    before = np.array([*(0 * chance for chance in found.chances), *others])
     each_side = np.array([both(*density) for density in densities])
     after = sample_allocation.evened(wanted, both(*kept), each_side, before[:, first])
-    after = before * ops.divide(after, before[:, first])[:, cosine]
-    after = after * ops.divide(before.sum(axis=0), after.sum(axis=0))
-    chance, *chances = before + shares * (after - before)
-    return replace(found, chance=chance, passes=replace(passes, **dict(zip(Parts.CHANCES, chances))))
+    after = ops.divide(after, after.sum(axis=0))[:, cosine] * before.sum(axis=0)
+    of_lobes, (chance, *passing) = np.split(before + shares * (after - before), [len(found.chances)])
+    chances = [own + more for own, more in zip(found.chances, of_lobes)]
+    return replace(found, chances=chances, chance=chance, passes=replace(passes, **dict(zip(Parts.CHANCES, passing))))

@@ -1,7 +1,8 @@
-"""Light that several rough interfaces make too wide for lobes, as waves of the azimuth over momentum there and back.
+"""Light that panes with a rough interface make too wide for lobes, as waves of the azimuth over momentum.
 
-No facet alone sends light where two rough interfaces together send it, so that lobes, which are of one facet each, have
-the right energy and another shape. The nodes have that shape. With z_o the cosine of the light that leaves,
+No facet alone sends light where two facets send it in turn: those of two interfaces, or of one that a polished back
+throws light to again. So lobes, which are of one facet each, have the right energy there, and another shape. The nodes
+have that shape. With z_o the cosine of the light that leaves,
 s = -(x_i x_o + y_i y_o), positive on the side of the mirror direction, and P^2 = |p_i|^2 |p_o|^2,
 
     pi f(wi, wo) = E max(sum_mk c_mk W_m(s, P) L_k(2 z_o - 1), 0),   W_0 = 1, W_1 = s, W_(m+1) = 2 s W_m - P^2 W_(m-1),
@@ -45,21 +46,24 @@ STEADY = 0.97  # ratio of a wave to the one before it, at most
 
 def share(material: Material) -> float:
     """Share of the light of a material of NumPy's values that may have this shape: the more, the more its roughest
-    interface and another one turn it; none of opaque stacks, and of solids, inside which much light is trapped."""
+    interface turns it, and another one reflects it; none of opaque stacks, and of solids, inside which much light is
+    trapped."""
     if not material.transmits:
         return 0.0
     outside = float(ops.mean(np.ravel(material.exterior)))
-    n, first, second, round_ = outside, 0.0, 0.0, 1.0
+    n, roughest, second, round_ = outside, (0.0, 0.0), 0.0, 1.0
     for layer in material.solid().layers:
         if not isinstance(layer, InterfaceValues):
             continue
         above, n = n, float(ops.mean(np.ravel(layer.eta)))
         low, high = sorted((max(float(layer.alpha_u), ALPHA_MIN), max(float(layer.alpha_v), ALPHA_MIN)))
-        alpha = low * min(abs(np.log(n / above)) / fitted.WIDE_STEP, 1.0)
-        first, second = max(first, alpha), max(second, min(first, alpha))
+        step = abs(np.log(n / above))
+        found = low * min(step / fitted.WIDE_STEP, 1.0), step
+        second = max(second, min(roughest, found)[1])
+        roughest = max(roughest, found)
         round_ = min(round_, 1 - _smooth(high / low, fitted.WIDE_STRETCH))
     pane = 1 - _smooth(abs(np.log(n / outside)), fitted.WIDE_SOLID)
-    return float(pane * _smooth(first, fitted.WIDE_FIRST) * _smooth(second, fitted.WIDE_SECOND) * round_)
+    return float(pane * _smooth(roughest[0], fitted.WIDE_ROUGHEST) * _smooth(second, fitted.WIDE_SECOND) * round_)
 
 
 def _smooth(x: Any, ends: tuple[float, float]) -> Any:
