@@ -124,7 +124,7 @@ def test_open_change_undo_reorder_save_and_reopen(visit: Open, served: Server) -
     assert vt.load(served.folder / "coats.yaml").flat()["layer0_eta"] == 1.6
     open_preset(page, "Gold")
     page.page.get_by_role("button", name="Open", exact=True).click()
-    page.page.get_by_role("button", name="coats.yaml").click()
+    page.page.get_by_role("button", name="coats.yaml", exact=True).click()
     page.page.wait_for_function("() => velatura.store.get().layers.length === 4")
     assert difference(page.picture(), moved) < SAME
 
@@ -888,7 +888,7 @@ def test_files_of_hostile_names_run_nothing(visit: Open, served: Server) -> None
     page = visit(script=hostile.WATCH)
     for file, name in files.items():
         page.page.get_by_role("button", name="Open", exact=True).click()
-        page.page.get_by_role("button", name="plain.yaml").wait_for()
+        page.page.get_by_role("button", name="plain.yaml", exact=True).wait_for()
         listed = page.page.locator("dialog.open").get_by_role("button", name=file, exact=True)
         assert listed.count() == (1 if file.isprintable() and "\\" not in file else 0)
         (listed if listed.count() else page.page.get_by_role("button", name="Cancel").first).click()

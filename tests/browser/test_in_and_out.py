@@ -235,6 +235,42 @@ def test_options_of_the_command_line_are_controls_of_the_formats_that_take_them(
     dialog.locator(".problem").get_by_text("prefix").wait_for()
 
 
+# The folder ----------------------------------------------------------------------------------------------------------
+
+
+def test_files_of_the_folder_are_renamed_removed_and_put_back(visit: Open, served: Server) -> None:
+    """Expected: the open material is saved to its file's new name; what is deleted is back as it was."""
+    page = visit(REFUSED)
+    for name in ("gold", "copper"):
+        (served.folder / f"{name}.yaml").write_text("layers: [{interface: {conductor: Au}}]\n")
+    button(page, "Open").click()
+    button(page, "gold.yaml").click()
+    said(page, "Opened")
+    button(page, "Open").click()
+    button(page, "Rename gold.yaml").click()
+    field = page.page.get_by_label("Name of gold.yaml")
+    field.fill("leaf")
+    field.press("Enter")
+    button(page, "leaf.yaml").wait_for()
+    assert page.page.locator(".document").inner_text() == "leaf.yaml"
+    button(page, "Rename leaf.yaml").click()
+    field = page.page.get_by_label("Name of leaf.yaml")
+    field.fill("copper")
+    field.press("Enter")
+    page.page.locator("dialog.open .problem").get_by_text("copper.yaml: exists already").wait_for()
+    button(page, "Rename leaf.yaml").click()
+    page.page.get_by_label("Name of leaf.yaml").press("Escape")
+
+    button(page, "Delete copper.yaml").click()
+    page.page.get_by_text("copper.yaml is deleted.").wait_for()
+    button(page, "copper.yaml").wait_for(state="detached")
+    assert not (served.folder / "copper.yaml").exists()
+    button(page, "Undo the deletion").click()
+    button(page, "copper.yaml").wait_for()
+    assert (served.folder / "copper.yaml").read_text() == "layers: [{interface: {conductor: Au}}]\n"
+    (served.folder / ".velatura-removed").rmdir()
+
+
 # Light ---------------------------------------------------------------------------------------------------------------
 
 

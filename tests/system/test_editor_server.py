@@ -309,6 +309,23 @@ def test_nothing_is_saved_outside_the_folder(here: Path, port: int, name: str) -
     assert {path.parent for path in here.parent.rglob("*coat.yaml")} <= {here}
 
 
+def test_files_that_are_moved_stay_in_the_folder_and_none_is_written_over(here: Path, port: int) -> None:
+    for name in ("a.yaml", "b.yaml"):
+        (here / name).write_text(name)
+    assert call(port, "rename", {"file": "a.yaml", "name": "b.yaml"})[0] == 409
+    for name in ("../c.yaml", "c.json", "c.png"):
+        assert call(port, "rename", {"file": "a.yaml", "name": name})[0] == 422
+    assert call(port, "remove", {"file": "a.yaml"}) == (200, {"file": "a.yaml"})
+    (here / "a.yaml").write_text("another")
+    assert call(port, "remove", {"file": "a.yaml"}) == (200, {"file": "a-2.yaml"})
+    assert call(port, "list", {})[1]["files"] == ["b.yaml"]
+    assert call(port, "restore", {"file": "a.yaml", "name": "b.yaml"})[0] == 409
+    assert call(port, "restore", {"file": "../b.yaml", "name": "c.yaml"})[0] == 422
+    assert call(port, "restore", {"file": "none.yaml", "name": "c.yaml"})[0] == 422
+    assert call(port, "restore", {"file": "a.yaml", "name": "a.yaml"})[0] == 200
+    assert {path.name: path.read_text() for path in here.glob("*.yaml")} == {"a.yaml": "a.yaml", "b.yaml": "b.yaml"}
+
+
 def test_names_of_pictures_write_no_headers(port: int) -> None:
     for name in ("a%0d%0aSet-Cookie:%20a=b.png", "%22;%20filename=evil.exe.png", "%E2%80%AE.png", "a" * 5000 + ".png"):
         status, body, headers = ask(port, "GET", f"/files/{name}")

@@ -26,6 +26,7 @@ LARGEST = 32 * 2**20
 
 MATERIALS = (".yaml", ".yml", ".json")
 FOREIGN = tuple(imports.FORMATS)
+REMOVED = ".velatura-removed"  # where files lie that were removed
 PICTURES = (".png", ".jpg", ".jpeg", ".exr", ".hdr")
 
 
@@ -45,6 +46,7 @@ class Folder:
         """Every verb by the name that the page calls it by."""
         verbs = {"list": self.listed, "open": self.opened, "save": self.saved}
         verbs |= {"import": self.imported, "texture": self.texture}
+        verbs |= {"rename": self.renamed, "remove": self.removed, "restore": self.restored}
         return {name: admitting(verb) for name, verb in verbs.items()}
 
     def first(self, material: str) -> Answer:
@@ -104,6 +106,31 @@ class Folder:
             with beside(material, self.path, presets=True) as placed:
                 _write(path, dumps(placed, format, self.path).encode())
             return {"file": name, "version": _version(path)}
+
+    def renamed(self, body: Body) -> Answer:
+        """Give a material file another `name` of the same ending; Conflict where that is taken."""
+        path = self.existing(field(body, "file", str), MATERIALS)
+        target = self.place(field(body, "name", str), (path.suffix,))
+        with self.writing:
+            _move(path, target)
+        return {"file": target.name}
+
+    def removed(self, body: Body) -> Answer:
+        """Put a material file away, into the folder REMOVED, where it has the name of the answer."""
+        path = self.existing(field(body, "file", str), MATERIALS)
+        with self.writing:
+            (self.path / REMOVED).mkdir(exist_ok=True)
+            target = self.free(self.path / REMOVED / path.name)
+            _move(path, target)
+        return {"file": target.name}
+
+    def restored(self, body: Body) -> Answer:
+        """Put a `file` that was put away back, as `name`; Conflict where that is taken meanwhile."""
+        put = self.place(field(body, "file", str), MATERIALS).name
+        target = self.place(field(body, "name", str), MATERIALS)
+        with self.writing:
+            _move(self.path / REMOVED / put, target)
+        return {"file": target.name}
 
     def texture(self, body: Body) -> Answer:
         """Put a picture into the folder, under a name that is free, or is this very picture's already."""
@@ -202,6 +229,15 @@ class Folder:
             return self.existing(name, endings).is_file()
         except InvalidInput:
             return False
+
+
+def _move(path: Path, target: Path) -> None:
+    if target.exists():
+        raise Conflict(f"{target.name}: exists already")
+    try:
+        os.rename(path, target)
+    except OSError as error:
+        raise InvalidInput(f"{path.name}: cannot be moved: {reason(error)}") from None
 
 
 def _decoded(body: Body) -> bytes:

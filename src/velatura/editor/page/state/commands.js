@@ -51,6 +51,12 @@ export const saved = titled('save', (state, material, file, version) => ({
   disk: { ...state.disk, [state.document]: { ...placeOf(state), file, version, text: JSON.stringify(material) } },
 }));
 
+/** A file of the disk has another name now. */
+export const fileRenamed = titled('rename a file', (state, from, to) => {
+  const named = ([number, place]) => [number, place.file === from ? { ...place, file: to } : place];
+  return { ...state, disk: Object.fromEntries(Object.entries(state.disk).map(named)) };
+});
+
 /**
  * Where the material lies on the disk: `{file, version}`, of nulls where it does not; `imported`: the `file` of another program that
  * it was read from, and what is `left` of that, in lines.

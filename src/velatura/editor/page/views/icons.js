@@ -12,6 +12,7 @@ export const icons = {
   grip: path('M3 5h10M3 8h10M3 11h10'),
   duplicate: path('M5.5 5.5h8v8h-8zM10.5 5.5v-3h-8v8h3'),
   remove: path('M4 4l8 8M12 4l-8 8'),
+  rename: path('M3 13l.7-3L11 2.7 13.3 5 6 12.3zM9.5 4.2l2.3 2.3'),
   beside: path('M2.5 3h11v10h-11zM8 3v10'),
   fold: path('M3.5 6l4.5 4.5L12.5 6'),
   unfold: path('M6 3.5L10.5 8 6 12.5'),

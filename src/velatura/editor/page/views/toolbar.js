@@ -7,6 +7,7 @@ import { isChanged, placeOf } from '../state/commands.js';
 import { FOREIGN } from '../files.js';
 import { iconButton } from './controls.js';
 import { createExports } from './exporting.js';
+import { createLibrary } from './library.js';
 import { createRendering } from './rendering.js';
 
 /** `view()`, `saveAs()` and `saveAgain()` as its buttons do, and `mix()`, which chooses what the material is mixed with. */
@@ -18,7 +19,7 @@ export function createToolbar(services) {
     exports: createExports(services),
     rendering: createRendering(services),
     dialogs,
-    listed: null, // files of the folder
+    library: createLibrary(services),
     targets: null, // of the papers
     sought: '', // in the titles of what can be opened
     mixing: false, // whether what is chosen is mixed with the material, and not opened
@@ -79,11 +80,10 @@ const step = (word, icon, act, can, title) =>
 
 async function openDialog(bar, mixing = false) {
   bar.mixing = mixing;
-  bar.listed = null;
   bar.sought = '';
   bar.update();
   bar.dialogs.open.value.showModal();
-  if (!bar.lacks('list')) await bar.messages.attempt('list', async () => (bar.listed = (await bar.call('list', {})).files));
+  await bar.library.read();
   bar.update();
   if (!mixing && !bar.lacks('targets')) await bar.messages.attempt('targets', async () => (bar.targets ??= (await bar.call('targets', {})).targets));
   bar.update();
@@ -114,7 +114,6 @@ function openPanel(bar) {
   }));
   const groups = [...new Set(presets.map(({ group }) => group))].sort();
   const targets = (bar.targets ?? []).map((target) => ({ title: target.title, act: () => bar.openTarget(target) }));
-  const listed = (bar.listed ?? []).map((file) => ({ title: file, act: () => bar.files.openFile(file, take) }));
   const section = (title, entries, empty = nothing) => html`
     <h2>${title}</h2>
     ${entries.length ? nothing : empty}
@@ -138,7 +137,7 @@ function openPanel(bar) {
       <button type="button" @click=${close}>Cancel</button>
     </div>
     ${groups.map((name) => some(name, byTitle(presets.filter(({ group }) => group === name))))}
-    ${some('Files of the folder', listed, html`<p>${bar.lacks('list') || (bar.listed ? 'There are none.' : 'Reading the folder.')}</p>`)}
+    ${bar.library.view(sought, (file) => close() || bar.files.openFile(file, take))}
     ${mixing ? nothing : some('From the papers', targets, html`<p>${bar.lacks('targets') || 'On their way.'}</p>`)}
   </dialog>`;
 }
