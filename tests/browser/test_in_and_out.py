@@ -177,6 +177,26 @@ def test_a_file_of_the_folder_is_opened_with_its_image_and_one_is_mixed_in(visit
     assert sorted(file.name for file in served.folder.iterdir()) == ["gilt.xml", "wood.png"]
 
 
+def test_images_of_subfolders_are_put_into_the_folder(visit: Open, served: Server) -> None:
+    """Expected: the image by the name that is free there, though the glTF has it in a folder."""
+    page = visit()
+    (served.folder / "wood.png").write_bytes(b"another")
+    image = io.BytesIO()
+    imsave(image, np.full((4, 4, 3), 0.5), format="png")
+    core = {"baseColorTexture": {"index": 0}, "metallicFactor": 0}
+    scene = {
+        "asset": {"version": "2.0"},
+        "images": [{"uri": "textures/wood.png"}],
+        "textures": [{"source": 0}],
+        "materials": [{"name": "Oak", "pbrMetallicRoughness": core}],
+    }
+    drop(page, ("oak.gltf", json.dumps(scene)), ("wood.png", image.getvalue()))
+    said(page, "Opened Oak")
+    assert (served.folder / "wood-2.png").read_bytes() == image.getvalue()
+    assert '"texture":"wood-2.png"' in page.page.evaluate("JSON.stringify(velatura.store.get().layers)")
+    page.settled()
+
+
 # Out -----------------------------------------------------------------------------------------------------------------
 
 

@@ -2,6 +2,7 @@
 
 import { render } from 'lit-html';
 import { Offline } from './connection.js';
+import { filesOf } from './dropped.js';
 import { createFiles } from './files.js';
 import { Viewport } from './render/viewport.js';
 import { lookAhead } from './state/ahead.js';
@@ -178,7 +179,7 @@ export function mount(root, { call, lacks = nothingLacks, live, session, storage
   followScrubbing(element, { signal });
   element.addEventListener('input', () => messages.forgiveAll('passing'), { signal });
   root.addEventListener('dragover', (event) => event.preventDefault(), { signal });
-  root.addEventListener('drop', (event) => onDrop(event, files), { signal });
+  root.addEventListener('drop', (event) => onDrop(event, { files, messages }), { signal });
   const counting = window.setInterval(() => {
     showSamples(element, viewport, picture.stage);
     showDifference(element, viewport);
@@ -291,14 +292,15 @@ function onKey(event, { store, save }) {
   act();
 }
 
-/** Takes files, or the name of a preset that is dragged as text; text that is dropped into a field is the field's. */
-function onDrop(event, { takeAll, openPreset }) {
-  const list = [...(event.dataTransfer?.files ?? [])];
-  const name = event.dataTransfer?.getData('text/plain').trim();
-  if (!list.length && (!name || event.target.matches?.('input, textarea'))) return;
+/** Takes files and folders, or the name of a preset that is dragged as text; text that is dropped into a field is the field's. */
+function onDrop(event, { files: { takeAll, openPreset }, messages }) {
+  const { dataTransfer } = event, holdsFiles = dataTransfer?.files.length > 0;
+  const name = dataTransfer?.getData('text/plain').trim();
+  if (!holdsFiles && (!name || event.target.matches?.('input, textarea'))) return;
   event.preventDefault();
-  if (list.length) takeAll(list);
-  else openPreset(name);
+  if (!holdsFiles) return void openPreset(name);
+  const dropped = filesOf(dataTransfer);
+  messages.attempt('files', async () => takeAll(await dropped));
 }
 
 const counted = (count, noun) => `${count} ${noun}${count === 1 ? '' : 's'}`;

@@ -1,5 +1,6 @@
 // Materials, light, objects and textures from and to files, folders and addresses.
 
+import { withImages } from './dropped.js';
 import { readPicture } from './render/environment.js';
 import { contentsOf, loadObject } from './render/load.js';
 import { objectOf } from './render/loader.js';
@@ -170,14 +171,16 @@ export function createFiles({ store, session, call, lacks, storage, messages, ad
         if (!chosen) return null;
         return chosen === OBJECT ? files.takeObject(file) : files.readFile(file, take);
       }),
-    /** Takes files dropped at once: one, or a material with its images, which are put into the folder. */
+    /** Takes files dropped at once, `[{file, path}]`: one, or a material with its images, which are put into the folder. */
     async takeAll(list) {
-      const material = list.length > 1 && list.find(({ name }) => isForeign(name));
-      if (!material) return files.take(list[0]);
-      await messages.attempt('images', async () => {
-        for (const image of list.filter(({ name }) => IMAGES.test(name)))
-          if ((await files.upload(image)) !== image.name) throw new Error(`${image.name}: another image of the folder has this name`);
-        await files.take(material);
+      const material = list.length > 1 && list.find(({ path }) => isForeign(path));
+      if (!material) return list.length ? files.take(list[0].file) : null;
+      return messages.attempt('images', async () => {
+        const names = new Map();
+        for (const { file, path } of list.filter(({ path }) => IMAGES.test(path))) names.set(path, await files.upload(file));
+        const { file, path } = material;
+        if (!names.size || /\.glb$/i.test(path)) return files.take(file);
+        return files.take(new File([withImages(await file.text(), path, names)], file.name));
       });
     },
     /** Opens a file dropped on the page, by its ending. */
