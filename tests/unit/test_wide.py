@@ -11,6 +11,7 @@ from velatura.benchmark.candidates import Pairs
 from velatura.benchmark.stacks import EDITIONS, Case
 from velatura.benchmark.walks import walked
 from velatura.model import named
+from velatura.model.base import Query
 from velatura.model.context import Context
 from velatura.model.solved import solve
 from velatura.model.solved.bsdf import Solved
@@ -19,7 +20,7 @@ from velatura.model.solved.sample_allocation import TARGET_SAMPLE_WEIGHT, evened
 from velatura.model.solved.transmission import forward
 from velatura.model.variance import variance_kind
 from velatura.reference import statistics
-from velatura.renderer.low_discrepancy import fibonacci
+from velatura.renderer.low_discrepancy import even_in_projection, fibonacci
 from velatura.stack import Diffuse, Interface, Material, Stack
 
 PATHS = 2**17
@@ -76,6 +77,15 @@ def test_panes_whose_facets_are_met_once_pass_what_walks_pass() -> None:
     passed = found.transmitted.energy[0]
     error = 4.5 * np.sqrt(passed * (1 - passed) / PATHS)
     assert np.all(np.abs(passed - true.transmitted.energy[0]) < 0.001 + error)
+
+
+@pytest.mark.parametrize("cosine", [1.0, 0.95])
+def test_a_pane_reflects_the_energy_of_its_lobes(cosine: float) -> None:
+    """Expected: the sum over directions, within .001; the remainder has hardly any light near the normal."""
+    x, y, z = even_in_projection(2**16)
+    found, wi = body(pane(0.3, 0.0)), directions(cosine, len(z))
+    reflected = np.pi * (found.eval_pdf(wi, (x, y, z))[0] / z).mean()
+    assert reflected == pytest.approx(np.mean(found.albedo(wi, Query(transmission=False))), abs=0.001)
 
 
 @pytest.mark.parametrize("form", ["forward", "symmetric"])

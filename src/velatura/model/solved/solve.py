@@ -458,15 +458,18 @@ class Solver:
         self, energies: Sequence[Array], folded: Folded | Listed, lobes: Sequence[_Lobe], rest: Array, whole: Array
     ) -> tuple[list[_Weighed], Array]:
         """Divide energies of lobes by their integrals; the remainder takes what light it can, by which a lobe would be
-        too bright, and has the energy that is returned. `whole` is its albedo without a scale."""
-        drawn = []
+        too bright, and has the energy that is returned. `whole` is its albedo without a scale. What its scale cannot
+        make of that, lobes have besides."""
+        drawn, of_lobes = [], sum(energies)
+        short = np.clip(rest - BRIGHTEST * whole, 0, of_lobes)
+        rest, share = rest - short, 1 + ops.divide(short, of_lobes)
         normals = self.normals or (FINELY[1] if self.finely else round(_share(len(lobes)) * NORMALS[self.isotropic]))
         for (shape, tensor), own in zip(lobes, energies):
             lobe = shape.lobe(1.0, tensor.roughness(folded.phi))
             z, squares, largest = refracted_lobe.integrals(lobe, folded.directions, normals)
-            more = np.clip(own - combined.MAX_GAIN * z, 0, np.maximum(BRIGHTER * whole - rest, 0))
+            more = np.clip(share * own - combined.MAX_GAIN * z, 0, np.maximum(BRIGHTER * whole - rest, 0))
             rest = rest + more
-            energy = own - more
+            energy = share * own - more
             weight = np.where(z > ENERGY_EPS, ops.divide(energy, z), 1.0)
             wanted = Demand.of(energy, weight * ops.divide(squares, z), weight * largest)
             drawn.append(_Weighed(energy, weight, wanted))
