@@ -5,7 +5,7 @@
 Stacks have 1 to 4 interfaces, of an index in 1.1 to 2.2 and alpha to .55 (one in seven is smooth), over metals,
 mirrors, glass and diffuse bases; what each kind has besides, its function says. Those of the half `fit` are for
 fitting, those of the half `test` never. Light comes from above at cosines 1, .7 and .35, and into solids also from
-inside, at the momenta n sin = 0, .6, .93, 1.04 and 1 + .6 (n - 1). The last four kinds are lit at .9, .5, .2 and .08
+inside, at the momenta n sin = 0, .6, .93, 1.04 and 1 + .6 (n - 1). The last six kinds are lit at .9, .5, .2 and .08
 from above alone. Every stack is a file in YAML, with its walks beside
 it as NPZ. What is there already is not walked again.
 """
@@ -30,6 +30,7 @@ from velatura.benchmark.random_stacks import (
     clear,
     cloudy,
     crossed,
+    etched,
     frosted,
     isotropic,
     lacquered,
@@ -98,6 +99,8 @@ KINDS = (
     Kind("brushed under lacquer", lacquered, True, light=SLANTED),
     Kind("crossed brushing", crossed, True, light=SLANTED),
     Kind("frosted pane", frosted, True, True, SLANTED),
+    Kind("etched pane", etched, True, True, SLANTED),
+    Kind("etched pane, reflected", etched, True, light=SLANTED),
     Kind("very rough", very_rough, True, True, SLANTED),
 )
 

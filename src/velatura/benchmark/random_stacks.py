@@ -236,6 +236,13 @@ def frosted(rng: np.random.Generator, number: int) -> Stack:
     return Stack([faces[0], *between, faces[1]], thin=True)
 
 
+def etched(rng: np.random.Generator, number: int) -> Stack:
+    """Panes of glass with a rough face and a polished one, in turn above."""
+    rough, eta = float(rng.uniform(0.15, 0.6)), float(rng.uniform(1.45, 1.6))
+    above, below = (rough, 0.0) if number % 2 == 0 else (0.0, rough)
+    return Stack([Interface(eta=eta, alpha=above), Interface(eta=1.0, alpha=below)], thin=True)
+
+
 def very_rough(rng: np.random.Generator, number: int) -> Stack:
     """Two very rough interfaces: solids and panes in turn."""
     alphas = rng.uniform(0.6, 1.0, 2)
