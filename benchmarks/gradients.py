@@ -1,8 +1,10 @@
 """Processor time of a step of an optimisation (`prb`, there and back): the first, with nothing compiled, and later.
-How smooth values are in a roughness, and how near its gradient is to their slope.
+How smooth values are in a roughness, and how near its gradient is to their slope. Gradients by an index
+that is the outside's.
 
 python benchmarks/gradients.py        # all cases, each in a process of its own that has no kernels of an earlier one
 python benchmarks/gradients.py smooth # roughness alone
+python benchmarks/gradients.py kink   # the index of the outside alone
 """
 
 from __future__ import annotations
@@ -43,6 +45,11 @@ ROUGH: dict[str, dict[str, Any]] = {
         "layer1_rotation": 30.0,
     },
 }
+WHITE: dict[str, dict[str, Any]] = {
+    "rough mirror": {"interface": {"conductor": "mirror", "alpha": 1.0}},
+    "diffuse base": {"diffuse": {"albedo": 1.0}},
+}
+SLANTS = 30, 70  # degrees
 LIT, SEEN = 48, (96, 192)  # directions of light, and those (angles, azimuths) over which what leaves is integrated
 
 
@@ -55,6 +62,7 @@ def main() -> None:
         row("first step", name, first)
         row("later steps", name, later)
     smooth()
+    kink()
 
 
 def smooth() -> None:
@@ -68,12 +76,9 @@ def smooth() -> None:
     import velatura as vt
 
     # Light from all sides of a sphere, without noise
+    wo, area = outwards()
     z, phi = np.sqrt((np.arange(LIT) + 0.5) / LIT), 2 * np.pi * 0.618034 * np.arange(LIT)
     wi = np.array([np.sqrt(1 - z * z) * np.cos(phi), np.sqrt(1 - z * z) * np.sin(phi), z])
-    x, weights = np.polynomial.legendre.leggauss(SEEN[0])
-    theta, turn = np.meshgrid((x + 1) * np.pi / 4, (np.arange(SEEN[1]) + 0.5) / SEEN[1] * 2 * np.pi, indexing="ij")
-    wo = np.array([np.sin(theta) * np.cos(turn), np.sin(theta) * np.sin(turn), np.cos(theta)]).reshape(3, -1)
-    area = (np.sin(theta) * weights[:, None]).ravel() * np.pi**2 / (2 * SEEN[1])
     lamp = mi.Float(np.tile(area * (1 + 4 * np.clip(np.array([0.48, 0.36, 0.8]) @ wo, 0, 1) ** 8), LIT) / LIT)
     si = dr.zeros(mi.SurfaceInteraction3f, LIT * area.size)
     si.wi, towards = mi.Vector3f(np.repeat(wi, area.size, axis=1)), mi.Vector3f(np.tile(wo, LIT))
@@ -98,6 +103,46 @@ def smooth() -> None:
             slope = float(cubic.deriv()(0)) * 100 / flat[key] * share
             row("unevenness", f"{name}, {key}", float(np.std(values - cubic(places)) / np.mean(values)), "of the light")
             row("gradient", f"{name}, {key}", float(dr.grad(parameters[key])[0]) * share, "", f"of a cubic {slope:.3g}")
+
+
+def kink() -> None:
+    """Light that white materials reflect: its gradient by an index that is the outside's, and the slope over 2 %."""
+    import mitsuba as mi
+
+    mi.set_variant("llvm_ad_rgb")
+    import drjit as dr
+
+    import velatura as vt
+
+    wo, area = outwards()
+    towards, si = mi.Vector3f(wo), dr.zeros(mi.SurfaceInteraction3f, area.size)
+
+    def light(bsdf: Any) -> Any:
+        return dr.sum(dr.mean(bsdf.eval(mi.BSDFContext(), si, towards)) * mi.Float(area))
+
+    for name, base in WHITE.items():
+        same, denser = (
+            vt.Stack.from_dict({"layers": [{"interface": {"eta": eta, "alpha": 0.1}}, base]}) for eta in (1.0, 1.02)
+        )
+        bsdf, eta = vt.bsdf(same), mi.Float(1.0)
+        parameters = mi.traverse(bsdf)
+        for slant in SLANTS:
+            si.wi = mi.Vector3f(float(np.sin(np.radians(slant))), 0.0, float(np.cos(np.radians(slant))))
+            slope = float((light(vt.bsdf(denser)) - light(vt.bsdf(same)))[0]) / 0.02
+            dr.enable_grad(eta)
+            parameters["layer0_eta"] = eta
+            parameters.update()
+            dr.clear_grad(eta)
+            dr.backward(light(bsdf))
+            row("gradient", f"{name}, {slant} degrees", float(dr.grad(eta)[0]), "", f"of differences {slope:.3f}")
+
+
+def outwards() -> tuple[np.ndarray, np.ndarray]:
+    """Directions (3, N) of a quadrature over the hemisphere, and their solid angles (N,)."""
+    x, weights = np.polynomial.legendre.leggauss(SEEN[0])
+    theta, turn = np.meshgrid((x + 1) * np.pi / 4, (np.arange(SEEN[1]) + 0.5) / SEEN[1] * 2 * np.pi, indexing="ij")
+    wo = np.array([np.sin(theta) * np.cos(turn), np.sin(theta) * np.sin(turn), np.cos(theta)]).reshape(3, -1)
+    return wo, (np.sin(theta) * weights[:, None]).ravel() * np.pi**2 / (2 * SEEN[1])
 
 
 def measure(name: str) -> tuple[float, float]:
@@ -150,6 +195,7 @@ def measure(name: str) -> tuple[float, float]:
 
 if __name__ == "__main__":
     if len(sys.argv) > 1:
-        smooth() if sys.argv[1] == "smooth" else print(json.dumps(measure(sys.argv[1])))
+        alone = {"smooth": smooth, "kink": kink}.get(sys.argv[1])
+        alone() if alone else print(json.dumps(measure(sys.argv[1])))
     else:
         main()
