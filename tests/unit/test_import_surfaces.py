@@ -402,3 +402,39 @@ def test_a_linear_change_of_an_image_needs_no_curve(tmp_path: Path) -> None:
     thickness = found.films[0].thickness_nm
     assert isinstance(thickness, vt.Texture)
     assert (thickness.scale, thickness.offset, thickness.curve) == (pytest.approx(500), pytest.approx(100), None)
+
+
+def coated(**extensions: Any) -> imports.Imported:
+    """A brown dielectric of glTF with extensions `KHR_materials_...`."""
+    core = {"baseColorFactor": [0.5, 0.3, 0.2, 1], "metallicFactor": 0, "roughnessFactor": 0.6}
+    named = {f"KHR_materials_{name}": values for name, values in extensions.items()}
+    return imports.from_gltf({"pbrMetallicRoughness": core, "extensions": named})
+
+
+@pytest.mark.parametrize("weight", [0.0, 0.3, 1.0])
+def test_a_coat_without_darkening_is_a_clearcoat(weight: float) -> None:
+    """Expected: equal materials, as in pairs of Khronos' CoatParameterSweep; the coat stands where both are given."""
+    coat = {"coatFactor": weight, "coatRoughnessFactor": 0.2, "coatDarkeningFactor": 0.0}
+    clearcoat = {"clearcoatFactor": weight, "clearcoatRoughnessFactor": 0.2}
+    found = coated(coat=coat)
+    assert found.stack == coated(clearcoat=clearcoat).stack
+    assert found.stack == coated(coat=coat, clearcoat={"clearcoatFactor": 0.9}).stack and not found.left
+
+
+def test_a_coat_of_gltf_has_index_colour_darkening_and_brushing() -> None:
+    """Expected: those of the coat of OpenPBR, which has the same terms, on a base whose index counts from the coat's;
+    alpha and angle as of the base's own brushing; a coat without a weight is none, whatever its colour."""
+    coat = {"coatFactor": 1, "coatRoughnessFactor": 0.3, "coatIor": 1.7, "coatColorFactor": [0.9, 0.5, 0.2]}
+    brushed = {"coatAnisotropyStrength": 0.5, "coatAnisotropyRotation": np.pi / 6}
+    found: Any = coated(coat={**coat, **brushed}).stack
+    top, medium, below, base = found.layers
+    assert (top.eta, top.rotation) == (1.7, pytest.approx(30))
+    np.testing.assert_allclose(top.alpha, (0.09 * 0.75 + 0.25, 0.09))
+    np.testing.assert_allclose(np.exp(-2 * np.array(medium.sigma_a)), (0.9, 0.5, 0.2), rtol=1e-5)
+    assert below.eta == pytest.approx(1.5 * 1.7)
+    plain: Any = coated(coat={**coat, "coatDarkeningFactor": 0.0}).stack.layers[-1]
+    assert np.all(np.array(base.albedo) < plain.albedo)
+    assert coated(coat={**coat, "coatFactor": 0}).stack == coated().stack
+    assert [each.parameter for each in coated(coat={**coat, "coatNormalTexture": {"index": 0}}).left] == [
+        "coatNormalTexture"
+    ]

@@ -56,8 +56,8 @@ class Surface:
     edge: the tint of a metal, which `index` takes with its colour for the index.
     tint: the transmittance of each crossing of a clear base, of a pane as a whole.
     film: index, and thickness in nanometres.
-    by_sight: whether the program knows nothing of what a coat does below it. Base and coat then keep what they reflect:
-        the index is relative to the coat's, and the coat does not darken.
+    by_sight: whether the program knows nothing of what a coat does to the reflectance below it, which base and coat
+        then keep: the index is relative to the coat's.
     """
 
     alpha: Alpha

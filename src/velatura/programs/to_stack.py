@@ -102,7 +102,7 @@ def _metal(surface: Surface, outside: float | None, notes: Notes) -> Interface:
     Light of a smooth metal that reflects r meets it again below a coat that reflects F: of what enters the coat,
     r (1 - F) / (1 - r F) comes out. For no darkening that is to be the reflectance in air.
     """
-    tint, delta = np.array(surface.edge), _darkening(surface)
+    tint, delta = np.array(surface.edge), surface.coat.darkening
     film = _film(surface, notes)
     if isinstance(surface.colour, Texture):
         tint = np.array(np.mean(tint))
@@ -157,10 +157,6 @@ def _clear(surface: Surface, base: list[Layer], outside: float) -> list[Layer]:
     return [*base, *below, Interface(eta=float(np.mean(eta)), alpha=0.0)] if below else base  # type: ignore[arg-type]
 
 
-def _darkening(surface: Surface) -> float:
-    return 0.0 if surface.by_sight else surface.coat.darkening
-
-
 def _film(surface: Surface, notes: Notes) -> dict[str, Any]:
     if surface.film is None:
         return {}
@@ -188,7 +184,7 @@ def _diffuse(surface: Surface, above: list[Interface], base: list[Layer]) -> Val
     covers = [_plain(each) for each in base if isinstance(each, Interface)]
     outside = float(above[0].eta) if above else 1.0  # type: ignore[arg-type]
     _, kept = _above_diffuse(covers, outside)
-    delta = _darkening(surface) if above else 1.0
+    delta = surface.coat.darkening if above else 1.0
     if delta == 1:
         return changed(surface.colour, lambda seen: _inside(seen, kept))
     reflected, _ = _above_diffuse([_plain(each) for each in _dielectric(surface, 1.0, Notes())])

@@ -17,7 +17,7 @@ from velatura.programs import embedded
 from velatura.programs.given import is_number
 from velatura.programs.gltf import read as gltf
 from velatura.programs.gltf.images import Images
-from velatura.programs.gltf.parameters import CHANNELS, CLEARCOAT, CORE
+from velatura.programs.gltf.parameters import ANISOTROPY, CHANNELS, CLEARCOAT, COAT, CORE
 from velatura.programs.imported import Imported, Notes, shown
 from velatura.programs.surface import INDICES
 from velatura.programs.values import Value, changed
@@ -85,6 +85,8 @@ def of_material(
         return Imported(loads(json.dumps(held), "the stack in extras.json", folder), tuple(notes.left))
     extensions = _holding(material.get("extensions", {}), "extensions")
     parts = {name: _holding(part, name) for name, part in {CORE: material.get(CORE, {}), **extensions}.items()}
+    if COAT in parts:
+        parts.pop(CLEARCOAT, None)  # which is there for those that know no other
     values: dict[str, Any] = {}
 
     # Factors, by the parts that they stand in
@@ -92,9 +94,10 @@ def of_material(
         if factor.within and factor.name in parts.get(factor.within, {}):
             given = parts[factor.within][factor.name]
             values[factor.name] = given[:3] if factor.is_colour and isinstance(given, list | tuple) else given
-    if values.get("ior") == 0:
-        notes.add("ior", 0.0, f"an infinite index: {INDICES[1]:g} stands for it")
-        values["ior"] = INDICES[1]
+    for index in ("ior", "coatIor"):
+        if values.get(index) == 0:
+            notes.add(index, 0.0, f"an infinite index: {INDICES[1]:g} stands for it")
+            values[index] = INDICES[1]
     strength = _number(parts.get("KHR_materials_emissive_strength", {}), "emissiveStrength", 1.0)
     if any(material.get("emissiveFactor", ())):
         emitted = material["emissiveFactor"]
@@ -113,10 +116,11 @@ def of_material(
         if texture is not None:
             values[factor.name] = _scaled(texture, most, least, factor.name, notes)
     for key in gltf.IGNORED:
-        if key in material or key in parts.get(CLEARCOAT, {}):
+        if any(key in part for part in (material, parts.get(CLEARCOAT, {}), parts.get(COAT, {}))):
             values[key] = "an image"
-    if "anisotropyTexture" in parts.get("KHR_materials_anisotropy", {}):
-        notes.add("anisotropyTexture", "an image", "the strength and the rotation beside it stand for it")
+    for part, key in ((ANISOTROPY, "anisotropyTexture"), (COAT, "coatAnisotropyTexture")):
+        if key in parts.get(part, {}):
+            notes.add(key, "an image", "the strength and the rotation beside it stand for it")
 
     # Cover, and extensions that are not read
     if (mode := material.get("alphaMode", "OPAQUE")) != "OPAQUE":

@@ -6,6 +6,7 @@ from velatura.programs.parameters import GREATEST, ROUGH, UNIT, Input
 
 CORE = "pbrMetallicRoughness"
 CLEARCOAT = "KHR_materials_clearcoat"
+COAT = "KHR_materials_coat"
 ANISOTROPY = "KHR_materials_anisotropy"
 IOR = "KHR_materials_ior"
 SPECULAR = "KHR_materials_specular"
@@ -42,6 +43,9 @@ CHANNELS = {
     "roughnessFactor": "g",
     "clearcoatFactor": "r",
     "clearcoatRoughnessFactor": "g",
+    "coatFactor": "r",
+    "coatRoughnessFactor": "g",
+    "coatColorFactor": "rgb",
     "specularFactor": "a",
     "specularColorFactor": "rgb",
     "transmissionFactor": "r",

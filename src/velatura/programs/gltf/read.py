@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from typing import Any
 
 import numpy as np
@@ -18,6 +18,14 @@ from velatura.programs.values import Value, changed
 
 PARAMETERS = (
     *parameters.PARAMETERS,
+    # As proposed (https://github.com/KhronosGroup/glTF/pull/2534)
+    Input("coatFactor", 0.0, within=parameters.COAT),
+    Input("coatRoughnessFactor", 0.0, within=parameters.COAT),
+    Input("coatIor", 1.5, low=1.0, high=GREATEST, within=parameters.COAT),
+    Input("coatColorFactor", (1.0, 1.0, 1.0), within=parameters.COAT),
+    Input("coatDarkeningFactor", 1.0, within=parameters.COAT),
+    Input("coatAnisotropyStrength", 0.0, within=parameters.COAT),
+    Input("coatAnisotropyRotation", 0.0, -GREATEST, GREATEST, parameters.COAT),  # anticlockwise
     Input("emissiveFactor", (0.0, 0.0, 0.0), high=GREATEST),
     Input("sheenColorFactor", (0.0, 0.0, 0.0), within="KHR_materials_sheen"),
     Input("alpha", 1.0),
@@ -27,9 +35,10 @@ PARAMETERS = (
 IGNORED = {
     "normalTexture": parts.FLAT,
     "clearcoatNormalTexture": parts.FLAT,
+    "coatNormalTexture": parts.FLAT,
     "occlusionTexture": "no number of the material",
 }
-COAT = 1.5  # index of a clearcoat (KHR_materials_clearcoat)
+CLEARCOAT_ETA = 1.5  # (KHR_materials_clearcoat)
 
 
 def read(values: Mapping[str, Any], name: str = "", notes: Notes | None = None) -> Imported:
@@ -43,7 +52,7 @@ def read(values: Mapping[str, Any], name: str = "", notes: Notes | None = None) 
     metal = given.share("metallicFactor")
     shares = Shares(
         cover=given.share("alpha"),
-        coat=given.share("clearcoatFactor"),
+        coat=given.share("coatFactor" if coat_of(values) else "clearcoatFactor"),
         film=given.share("iridescenceFactor"),
         metal=metal,
         clear=given.share("transmissionFactor") if metal != 1 else 0.0,
@@ -51,7 +60,13 @@ def read(values: Mapping[str, Any], name: str = "", notes: Notes | None = None) 
     given.leave("sheenColorFactor", parts.FIBRES)
     given.leave("emissiveFactor", parts.LIGHT)
     given.leave("diffuseTransmissionFactor", parts.OPAQUE)
-    return imported(lambda part: _surface(given, part), shares, notes, name, "imported from glTF")
+    coat = _coat if coat_of(values) else _clearcoat
+    return imported(lambda part: _surface(given, part, coat), shares, notes, name, "imported from glTF")
+
+
+def coat_of(values: Mapping[str, Any]) -> bool:
+    """Whether a material has the coat that takes the place of a clearcoat."""
+    return any(name.startswith("coat") for name in values)
 
 
 def covered(mode: str, alpha: Value, cutoff: float) -> Value:
@@ -61,7 +76,7 @@ def covered(mode: str, alpha: Value, cutoff: float) -> Value:
     return alpha if mode == "BLEND" else 1.0
 
 
-def _surface(given: Given, part: Shares) -> Surface:
+def _surface(given: Given, part: Shares, coat: Callable[[Given], Coat]) -> Surface:
     """A part of the surface."""
     base: dict[str, Any] = {"colour": given["baseColorFactor"]}
     if part.metal:
@@ -80,9 +95,24 @@ def _surface(given: Given, part: Shares) -> Surface:
         rotation=float(np.degrees(given.number("anisotropyRotation"))) if strength else 0.0,
         eta=given.index("ior"),
         film=(given.index("iridescenceIor"), thickness_nm) if part.film else None,
-        coat=Coat(COAT, parts.alike(given["clearcoatRoughnessFactor"])) if part.coat else NO_COAT,
+        coat=coat(given) if part.coat else NO_COAT,
         by_sight=True,
         **base,
+    )
+
+
+def _clearcoat(given: Given) -> Coat:
+    return Coat(CLEARCOAT_ETA, parts.alike(given["clearcoatRoughnessFactor"]), darkening=0.0)
+
+
+def _coat(given: Given) -> Coat:
+    strength = given.number("coatAnisotropyStrength")
+    return Coat(
+        given.index("coatIor"),
+        parts.alphas(given["coatRoughnessFactor"], lambda r: formulas.alphas(r, strength)),
+        float(np.degrees(given.number("coatAnisotropyRotation"))) if strength else 0.0,
+        given["coatColorFactor"],
+        given.number("coatDarkeningFactor"),
     )
 
 

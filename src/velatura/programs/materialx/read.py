@@ -42,7 +42,11 @@ def _input_of(factor: str) -> str:
 
 
 _NO_INPUTS = ("iridescenceThicknessMinimum", "diffuseTransmissionFactor")
-_FACTORS = [name for name in (*(each.name for each in gltf.PARAMETERS), *gltf.IGNORED) if name not in _NO_INPUTS]
+_FACTORS = [
+    name
+    for name in (*(each.name for each in gltf.PARAMETERS), *gltf.IGNORED)
+    if name not in _NO_INPUTS and not name.startswith("coat")
+]
 #: Inputs of nodes that have other names than in the source.
 RENAMED: Mapping[str, Mapping[str, str | None]] = {
     "gltf_pbr": {

@@ -74,7 +74,7 @@ def _surface(given: Given, part: Shares, eta: float) -> Surface:
 def _coat(given: Given) -> Coat:
     rough, smooth = formulas.COAT_ALPHA
     blur = rough + given.number("clearcoat_gloss") * (smooth - rough)
-    return Coat(COAT, (blur, blur))
+    return Coat(COAT, (blur, blur), darkening=0.0)
 
 
 def _hue(given: Given) -> RGB:

@@ -81,6 +81,7 @@ def _coat(given: Given) -> Coat:
         _alpha(given["coat_roughness"], given.number("coat_anisotropy")),
         360 * given.number("coat_rotation"),
         given["coat_color"],
+        darkening=0.0,
     )
 
 
