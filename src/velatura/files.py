@@ -79,7 +79,7 @@ def content(path: Path, largest: int = LIMITS["bytes"]) -> bytes:
         left.spend(path, "files")
         try:
             check_regular(path)  # since opening a pipe or a device may wait, or do something
-            with open(os.open(path, os.O_RDONLY | os.O_NONBLOCK), "rb") as file:
+            with open(path, "rb", opener=_at_once) as file:
                 data = file.read(largest + 1) or b""
         except (OSError, ValueError) as error:
             if isinstance(error, InvalidInput):
@@ -89,6 +89,11 @@ def content(path: Path, largest: int = LIMITS["bytes"]) -> bytes:
             raise InvalidInput(f"{path}: is larger than {_size(largest)}")
         left.spend(path, "bytes", len(data))
     return data
+
+
+def _at_once(path: str, flags: int) -> int:
+    """Open a file without waiting, where the system knows of that."""
+    return os.open(path, flags | getattr(os, "O_NONBLOCK", 0))
 
 
 def text_of(path: Path, largest: int = LIMITS["bytes"]) -> str:
@@ -228,6 +233,14 @@ def whole(path: Path) -> Iterator[Path]:
             os.replace(unfinished, place)
     except OSError as error:
         raise _unwritable(path, error) from None
+
+
+def relative(path: str | Path, folder: Path) -> str:
+    """The path of a file from a folder, with forward slashes; unchanged where none leads there, as to another drive."""
+    try:
+        return Path(os.path.relpath(path, folder)).as_posix()
+    except ValueError:
+        return Path(path).as_posix()
 
 
 def reason(error: Exception) -> str:

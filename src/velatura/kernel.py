@@ -177,6 +177,10 @@ def require_llvm() -> None:
 
 def llvm_command() -> str:
     """The shell command that installs a working LLVM."""
+    if sys.platform == "win32":
+        return "winget install LLVM.LLVM"
+    if sys.platform == "darwin":
+        return f"brew install llvm@{TRUSTED_LLVM}"
     unset = "unset DRJIT_LIBLLVM_PATH; " if "DRJIT_LIBLLVM_PATH" in os.environ else ""
     sudo = "" if os.geteuid() == 0 else "sudo "
     return f"{unset}{sudo}apt-get update && {sudo}apt-get install -y libllvm{TRUSTED_LLVM}"
@@ -363,6 +367,13 @@ EXTRAS = {
     "sweep": "velatura sweep",
     "mie": "media of spheres",
 }
+
+
+#: What needs neither Mitsuba nor LLVM, and what does.
+WITHOUT = (
+    "Without Mitsuba and LLVM, lobes, the inverse, imports, bakes, shaders and sweeps of lobes work; "
+    "pictures, BSDFs, checks and random walks do not. The spectra of materials by name come with Mitsuba."
+)
 
 
 class Component(NamedTuple):

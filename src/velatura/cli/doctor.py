@@ -27,4 +27,5 @@ def doctor() -> None:
         if not finding.ok:
             print(f"To install {finding.what}: {finding.mend}")
     if not all(finding.ok for finding in findings):
+        print(kernel.WITHOUT)
         raise typer.Exit(1)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import os
 import time
 from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import asdict, dataclass, field
@@ -135,7 +134,7 @@ def facts_beside(path: Path) -> Path:
 
 def relative(path: Path, folder: Path | None) -> str:
     """A path as it stands in a file of a folder, if there is one."""
-    return path.resolve().as_posix() if folder is None else Path(os.path.relpath(path, folder.resolve())).as_posix()
+    return path.resolve().as_posix() if folder is None else files.relative(path, folder.resolve())
 
 
 def origin() -> str:

@@ -12,7 +12,7 @@ from typing import Any, TypeAlias
 import yaml
 
 from velatura.errors import InvalidInput
-from velatura.files import budget, text_of, whole
+from velatura.files import budget, relative, text_of, whole
 from velatura.readers import READERS
 from velatura.stack.mix import Described, Mix, from_dict
 from velatura.stack.paths import beside, is_preset, rewritten
@@ -178,7 +178,7 @@ def dumps(material: Described, format: str = "yaml", folder: str | Path | None =
     fields = material.to_dict()
     if folder is not None:
         start = Path(folder).resolve()
-        fields = rewritten(fields, lambda path: Path(os.path.relpath(path, start)).as_posix())
+        fields = rewritten(fields, lambda path: relative(path, start))
     if format == "json":
         return json.dumps(fields, indent=2, ensure_ascii=False) + "\n"
     if format == "yaml":

@@ -96,7 +96,8 @@ def engine(executor: Any, workers: int | None) -> Iterator[Engine]:
 
 
 def _cores() -> int:
-    return len(os.sched_getaffinity(0))
+    """Processors that this process may use, of all where the system has no such limit."""
+    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
 @contextlib.contextmanager
@@ -145,8 +146,11 @@ def _started_again(cluster: Any, count: int) -> Callable[[], None]:
 def _interrupts_wait() -> Iterator[None]:
     """Hold Ctrl-C back while the block runs, and from threads and processes that begin in it for good.
 
-    It reaches all processes of a terminal; this one ends the others.
+    It reaches all processes of a terminal; this one ends the others. Windows cannot hold it back.
     """
+    if not hasattr(signal, "pthread_sigmask"):
+        yield
+        return
     resource_tracker.ensure_running()  # which it would itself let through, once it had begun
     before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
     try:

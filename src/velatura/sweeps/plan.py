@@ -114,10 +114,14 @@ def _beside(folder: Path, fields: Any) -> Any:
 
 
 def versions() -> dict[str, str]:
-    """Versions of what the numbers depend on."""
-    return {"velatura": __version__, "python": platform.python_version()} | {
-        name: importlib.metadata.version(name) for name in PACKAGES
-    }
+    """Versions of what the numbers depend on; of a renderer that is not installed "none"."""
+    found = {"velatura": __version__, "python": platform.python_version()}
+    for name in PACKAGES:
+        try:
+            found[name] = importlib.metadata.version(name)
+        except importlib.metadata.PackageNotFoundError:
+            found[name] = "none"
+    return found
 
 
 def _described(function: Callable[..., Any]) -> dict[str, str]:
