@@ -26,6 +26,20 @@ def test_every_part_that_the_page_carries_has_its_licence() -> None:
         assert f"\n\n{name}\n\n" in licences
 
 
+@pytest.mark.parametrize("form", sorted((ROOT / ".github" / "ISSUE_TEMPLATE").glob("[!c]*.yml")), ids=lambda x: x.stem)
+def test_a_form_of_issues_asks_for_something(form: Path) -> None:
+    fields = yaml.safe_load(form.read_text(encoding="utf-8"))
+    assert fields["name"] and fields["description"]
+    assert any(each.get("validations", {}).get("required") for each in fields["body"])
+
+
+def test_the_paper_cites_what_the_references_have() -> None:
+    text = (ROOT / "paper" / "paper.md").read_text(encoding="utf-8")
+    cited = set(re.findall(r"@([a-z]+\d*)", text))
+    known = set(re.findall(r"^@\w+{(\w+),", (ROOT / "src" / "velatura" / "references.bib").read_text(), re.MULTILINE))
+    assert len(cited) > 8 and cited <= known
+
+
 def test_the_package_is_typed() -> None:
     assert (Path(velatura.__file__).with_name("py.typed")).is_file()
 
