@@ -18,6 +18,7 @@ import yaml
 import velatura as vt
 from velatura.errors import Damaged
 from velatura.sweeps import Plan, load_plan
+from velatura.sweeps import run as sweeping
 from velatura.sweeps.store import DONE, FAILED, StoredVariable, create, existing
 
 Run = Callable[..., tuple[int, str, str]]
@@ -325,6 +326,23 @@ def test_a_store_whose_plan_is_none_is_refused(plan: Any, intact: Path, tmp_path
 
 
 # Questions -----------------------------------------------------------------------------------------------------------
+
+
+def test_parts_make_the_store_that_one_sweep_makes(tmp_path: Path) -> None:
+    """Also where one is repeated, and where another one has begun the store meanwhile."""
+    space = {**GOLD, "vary": {"layer0_alpha": {"range": [0.1, 0.5]}}, **DRAWN, "count": 7}
+    whole, parts = (tmp_path / name for name in ("whole", "parts"))
+    for part in ("2/3", "2/3", "3/3", "1/3"):
+        found = swept(space, number, parts, chunk=2, part=part)
+        if part == "2/3":
+            assert found.status.notnull().values.tolist() == [False] * 2 + [True] * 2 + [False] * 3
+    assert found.equals(swept(space, number, whole, chunk=2))
+    for part in ("0/3", "4/3", "one", "1/3/5"):
+        with pytest.raises(vt.InvalidInput, match=r"^part: must be K/N"):
+            swept(space, number, parts, chunk=2, part=part)
+    plan = Plan.from_dict({**space, "what": number, "options": {}, "chunk": 2})
+    begun = existing(parts, plan)
+    assert begun and sweeping._begun(parts, plan, begun.layout, "1/3").path == parts
 
 
 def test_a_point_that_fails_does_not_stop_the_others(tmp_path: Path) -> None:

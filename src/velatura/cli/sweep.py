@@ -30,12 +30,19 @@ def sweep(
     workers: Annotated[
         int | None, typer.Option(min=1, max=4096, metavar="N", help="Processes here; default: one for each core.")
     ] = None,
+    part: Annotated[
+        str | None, typer.Option(metavar="K/N", help="One part of N alone, as a job of an array: 3/64.")
+    ] = None,
 ) -> None:
     """Ask the same of many materials, here or on a cluster."""
     from velatura import sweeps
 
     start = time.perf_counter()
-    found = sweeps.carry_out(sweeps.load_plan(plan), output, scheduler, workers)
+    found = sweeps.carry_out(sweeps.load_plan(plan), output, scheduler, workers, part=part)
+    seconds = f"{time.perf_counter() - start:.1f} s"
+    if part:  # beside others that write, whose points are not read
+        print(f"{output}: part {part} is done, {seconds}")
+        return
     failed = int((found.status == 0).sum())
     why = f", {failed} failed: see `reason`" if failed else ""
-    print(f"{output}: {found.status.size} points{why}, {time.perf_counter() - start:.1f} s")
+    print(f"{output}: {found.status.size} points{why}, {seconds}")

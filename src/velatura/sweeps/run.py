@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 import warnings
 from collections import deque
 from collections.abc import Callable, Mapping, Set
@@ -14,6 +15,7 @@ from typing import TYPE_CHECKING, Any
 from velatura import kernel
 from velatura.errors import Damaged, InvalidInput, VelaturaError
 from velatura.progress import bar
+from velatura.stack.schema import show
 from velatura.sweeps import work
 from velatura.sweeps.engines import BREAKDOWNS, Engine, engine
 from velatura.sweeps.plan import Plan, versions
@@ -39,6 +41,7 @@ def sweep(
     executor: Any = None,
     workers: int | None = None,
     chunk: int | None = None,
+    part: str | None = None,
     progress: Progress | None = None,
     **options: Any,
 ) -> Dataset:
@@ -58,7 +61,8 @@ def sweep(
             dask, or its client; or any executor in the style of `concurrent.futures`.
         workers: processes of this machine; or how many tasks an executor runs at once, if it does not report it.
         chunk: points that are computed and written at once; by default, half the root of their number.
-        progress: called with (points done, all points); by default a bar with the time left.
+        part: "3/64": one part of the chunks alone, as a job of an array computes it; all parts share the store.
+        progress: called with (points done, all points of the part); by default a bar with the time left.
         options: keyword arguments of `what` (`cos_theta=[1, 0.5]`).
 
     Returns:
@@ -67,14 +71,14 @@ def sweep(
         NaN, their `status` is 0, and `reason` says why. The attributes hold the plan as YAML, and all versions.
 
     Raises:
-        InvalidInput: not a space, an unknown question or option, a store that holds something else, no scheduler at
-            that address, or none of the first points has an answer.
+        InvalidInput: not a space, an unknown question or option, a part that is none, a store that holds something
+            else, no scheduler at that address, or none of the first points has an answer.
         MissingTool: the extra `sweep` is not installed; or LLVM is missing on a worker.
         VelaturaError: the engine broke down; what is in the store stays.
     """
     fields = {key: getattr(space, key) for key in Space.model_fields} if isinstance(space, Space) else dict(space)
     plan = Plan.from_dict({**_given(fields), "what": what, "options": options, **({"chunk": chunk} if chunk else {})})
-    return carry_out(plan, store, executor, workers, progress)
+    return carry_out(plan, store, executor, workers, progress, part)
 
 
 def _given(fields: dict[str, Any]) -> dict[str, Any]:
@@ -87,12 +91,13 @@ def carry_out(
     executor: Any = None,
     workers: int | None = None,
     progress: Progress | None = None,
+    part: str | None = None,
 ) -> Dataset:
-    """Carry out a plan, as `sweep` does."""
-    path = Path(store).absolute()
+    """Carry out a plan, or a part of it, as `sweep` does."""
+    path, own = Path(store).absolute(), _slice(part)
     found = existing(path, plan)
-    done = set[int]() if found is None else _sound(found)
-    if found is None or len(done) < len(found.chunks):
+    done = set[int]() if found is None else _sound(found, found.chunks[own])
+    if found is None or len(done) < len(found.chunks[own]):
         with kernel.threads_restored(), engine(executor, workers) as runs:
             job = work.Job(plan, path, None, versions())
             if found is None:
@@ -101,16 +106,38 @@ def carry_out(
                 except BREAKDOWNS as error:
                     broke = f"{path}: the executor broke down ({type(error).__name__}) before a point was stored"
                     raise VelaturaError(broke) from None
-                found = create(path, plan, layout)
-            course = _Course(runs, found, replace(job, layout=found.layout).packed(), done)
+                found = _begun(path, plan, layout, part)
+            packed = replace(job, layout=found.layout).packed()
+            course = _Course(runs, found, packed, found.chunks[own], done)
             with nullcontext(progress) if progress else bar(f"Sweeping {path.name}") as advance:
                 course.run(advance)
     return found.open()
 
 
-def _sound(store: Store) -> set[int]:
-    """The chunks that are done; warns of those that are marked, and were damaged since."""
-    marked, damaged = store.marked(), dict[int, Path]()
+def _slice(part: str | None) -> slice:
+    """The chunks of a part, "3/64": every 64th, from the third; all without one. Raises InvalidInput."""
+    if part is None:
+        return slice(None)
+    found = re.fullmatch(r"([0-9]{1,6})/([0-9]{1,6})", part) if isinstance(part, str) else None
+    if not found or not 1 <= int(found[1]) <= int(found[2]):
+        raise InvalidInput(f"part: must be K/N, of whole numbers with K from 1 to N, such as 3/64, got {show(part)}")
+    return slice(int(found[1]) - 1, None, int(found[2]))
+
+
+def _begun(path: Path, plan: Plan, layout: Layout, part: str | None) -> Store:
+    """A new store; where another part has begun it meanwhile, that one."""
+    try:
+        return create(path, plan, layout)
+    except InvalidInput:
+        found = existing(path, plan) if part else None
+        if found is None:
+            raise
+        return found
+
+
+def _sound(store: Store, own: range) -> set[int]:
+    """Chunks of these that are done; warns of those that are marked, and were damaged since."""
+    marked, damaged = [chunk for chunk in store.marked() if chunk in own], dict[int, Path]()
     with bar(f"Checking {store.path.name}") as advance:
         for n, chunk in enumerate(marked):
             if file := store.damage(chunk):
@@ -170,12 +197,14 @@ class _Course:
         runs: the engine.
         store: what is there already.
         packed: the job of the workers.
+        own: the chunks that are asked for.
         done: chunks that are left as they are.
     """
 
-    def __init__(self, runs: Engine, store: Store, packed: bytes, done: Set[int]) -> None:
+    def __init__(self, runs: Engine, store: Store, packed: bytes, own: range, done: Set[int]) -> None:
         self._runs, self._store, self._packed = runs, store, packed
-        self._todo = deque(chunk for chunk in store.chunks if chunk not in done)
+        self._todo = deque(chunk for chunk in own if chunk not in done)
+        self._total = sum(map(store.count, own))
         self._tasks: dict[Any, tuple[int, ...]] = {}
         self._left = sum(map(store.count, self._todo))
         self._pace: float | None = None  # seconds that a chunk takes
@@ -186,7 +215,7 @@ class _Course:
         Raises:
             VelaturaError: the engine broke down.
         """
-        total = self._store.size
+        total = self._total
         progress(total - self._left, total)
         try:
             while self._todo or self._tasks:
