@@ -57,8 +57,9 @@ class ScatteringEvent:
 
     The densities weigh strategies against each other: that of scattering on (`sample`), and that of coming back the
     same way when refraction is certain (`sample_refraction`). At a smooth surface both are infinite, and stand for
-    their ratio: the second is 1, and the first holds how far refraction spreads directions. `light` is the polarisation
-    along wo, None where it is left out or was not followed.
+    their ratio: the second is 1, and the first holds how far refraction spreads directions. `certain` is the density of
+    `sample_refraction` here, and `reverse` that of `sample` coming back; of `sample_refraction` the latter is that of
+    `sample` here. `light` is the polarisation along wo, None where it is left out or was not followed.
     """
 
     wo: Direction
@@ -66,6 +67,8 @@ class ScatteringEvent:
     reflected: Value
     density: Value
     density_back: Value
+    certain: Value
+    reverse: Value
     light: Polarisation | None = None
 
 
@@ -83,7 +86,7 @@ def evaluate(meeting: SurfaceMeeting, wo: Direction, reflected: Value) -> Scatte
     return _with_diffuse_base(
         meeting,
         lambda: _evaluate_interface(meeting, wo, reflected),
-        lambda: _evaluate_diffuse(meeting.layers.albedo, wo),
+        lambda: _evaluate_diffuse(meeting, wo),
     )
 
 
@@ -100,8 +103,9 @@ def sample_refraction(meeting: SurfaceMeeting, u1: Value, u2: Value) -> Scatteri
     weight = ops.select(o[2] < 0, transmittance * surface.masking(o), 0.0)
     density, back = _densities(surface, i, h, o, eta)
     density = ops.select(surface.smooth, 1.0, density)
-    back = ops.select(surface.smooth, _spread(o, i, 1 / eta), back) * mean(transmittance)
-    return ScatteringEvent(surface.out_of(o), weight, False, density, back)
+    share = mean(transmittance)
+    back = ops.select(surface.smooth, _spread(o, i, 1 / eta), back) * share
+    return ScatteringEvent(surface.out_of(o), weight, False, density, back, density, density * share)
 
 
 def _sample_interface(meeting: SurfaceMeeting, carried: Value, u1: Value, u2: Value, u3: Value) -> ScatteringEvent:
@@ -121,11 +125,13 @@ def _sample_interface(meeting: SurfaceMeeting, carried: Value, u1: Value, u2: Va
     share = ops.select(reflected, reflectance, passing)
     weight = ops.divide(share, ops.select(reflected, chance, 1 - chance)) * surface.masking(o)
     weight = ops.select(_same(o[2] > 0, reflected), weight, 0.0)
-    density, back = _densities(surface, i, h, o, ops.select(reflected, 1.0, eta))
-    density = ops.select(surface.smooth, _spread(i, o, eta), density) * mean(share)
+    certain, back = _densities(surface, i, h, o, ops.select(reflected, 1.0, eta))
+    certain = ops.select(surface.smooth, ops.select(reflected, 1.0, _spread(i, o, eta)), certain)
+    back = ops.select(surface.smooth, 1.0, back)
     light = ops.select_record(reflected, mirrored, refracted)
     light = light and light.seen_by(surface.out_of)
-    return ScatteringEvent(surface.out_of(o), weight, reflected, density, ops.select(surface.smooth, 1.0, back), light)
+    wo, share = surface.out_of(o), mean(share)
+    return ScatteringEvent(wo, weight, reflected, certain * share, back, certain, back * share, light)
 
 
 def _evaluate_interface(meeting: SurfaceMeeting, wo: Direction, reflected: Value) -> ScatteringEvent:
@@ -137,9 +143,10 @@ def _evaluate_interface(meeting: SurfaceMeeting, wo: Direction, reflected: Value
     serves = (cos_i > 0) & _same(ggx.dot(o, h) > 0, reflected) & _negate(surface.smooth)
     # Evaluate
     share = ops.select(reflected, *meeting.shares(ops.maximum(cos_i, 0.0)))
-    density, back = _densities(surface, i, h, o, eta)
-    density = ops.select(serves, density, 0.0)
-    return ScatteringEvent(wo, share * density * surface.masking(o), reflected, density * mean(share), back)
+    certain, back = _densities(surface, i, h, o, eta)
+    density, reverse = (ops.select(serves, each, 0.0) for each in (certain, back))
+    weight, share = share * density * surface.masking(o), mean(share)
+    return ScatteringEvent(wo, weight, reflected, density * share, back, certain, reverse * share)
 
 
 def _densities(surface: WalkedSurface, i: Direction, h: Direction, o: Direction, eta: Value) -> tuple[Value, Value]:
@@ -159,12 +166,12 @@ def _sample_diffuse(meeting: SurfaceMeeting, u1: Value, u2: Value) -> Scattering
     radius, phi, z = ops.sqrt(u1), 2 * pi * u2, ops.sqrt(1 - u1)
     wo = radius * ops.cos(phi), radius * ops.sin(phi), z
     light = meeting.light and unpolarised(wo, meeting.light.q)
-    return ScatteringEvent(wo, meeting.layers.albedo, True, z / pi, 0.0, light)
+    return ScatteringEvent(wo, meeting.layers.albedo, True, z / pi, 0.0, 0.0, meeting.wi[2] / pi, light)
 
 
-def _evaluate_diffuse(albedo: Value, wo: Direction) -> ScatteringEvent:
+def _evaluate_diffuse(meeting: SurfaceMeeting, wo: Direction) -> ScatteringEvent:
     density = ops.maximum(wo[2], 0.0) / pi
-    return ScatteringEvent(wo, albedo * density, True, density, 0.0)
+    return ScatteringEvent(wo, meeting.layers.albedo * density, True, density, 0.0, 0.0, meeting.wi[2] / pi)
 
 
 def _with_diffuse_base(

@@ -85,7 +85,8 @@ def sample_refraction(types: Any, meeting: SurfaceMeeting, rng: Any) -> tuple[Sc
     below = meeting.above ^ True
     back = SurfaceMeeting(meeting.layers, meeting.j, meeting.n_out, meeting.n_in, (wo[0], wo[1], -wo[2]), below)
     densities = events.evaluate(back, (i[0], i[1], -i[2]), False)
-    turned = replace(densities, wo=wo, density=densities.density_back, density_back=densities.density)
+    onward = densities.density_back
+    turned = replace(densities, wo=wo, density=onward, density_back=densities.density, certain=onward)
     many = _weighed(turned, ops.select(through, flight.weight, 0.0))
     return ops.select_record(rough, many, once), flight.rng
 
@@ -186,7 +187,8 @@ def _sides(meeting: SurfaceMeeting, outside: Value) -> tuple[Value, Value, Value
 
 
 def _weighed(event: ScatteringEvent, weight: Value) -> ScatteringEvent:
-    return replace(event, weight=weight, density=event.density + _FLOOR, density_back=event.density_back + _FLOOR)
+    names = "density", "density_back", "certain", "reverse"
+    return replace(event, weight=weight, **{name: getattr(event, name) + _FLOOR for name in names})
 
 
 def _reverse(w: Direction) -> Direction:

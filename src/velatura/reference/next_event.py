@@ -6,6 +6,9 @@ surfaces is found by m + 1 strategies, which differ in how many of these refract
 did; the balance heuristic weighs them (Veach and Guibas 1995). The path that draws them all is the plain evaluation of
 the last surface.
 
+A path that is followed from either end by chance has the strategies of both, weighed together: what one end must find
+in the tail of its first facets, the other evaluates there.
+
 No path can hit a direction behind smooth surfaces. What happens between those that come first from the outside is
 therefore no matter of chance: all reflections among them are summed up, and the way through them is their sum.
 """
@@ -35,7 +38,8 @@ class WayOut:
 
     `up` and `down` are the light that arrives outside of what starts at the top of the slab, or at its bottom.
     `density` is that of the drawn w. `others`, times the density with which a path would take w, over `density`, is
-    the sum of the densities of all strategies that draw more by the path, relative to this one's.
+    the sum of the densities of all strategies that draw more by the path, relative to this one's. `reverse` is the
+    density with which a path from outside would draw w, over `density`.
     """
 
     w: tuple[Direction, ...]
@@ -43,6 +47,7 @@ class WayOut:
     down: tuple[Value, ...]
     density: tuple[Value, ...]
     others: tuple[Value, ...]
+    reverse: tuple[Value, ...]
 
 
 @dataclass(frozen=True)
@@ -62,7 +67,7 @@ class _Crossing:
 
 def way_out(types: Any, layers: WalkedLayers, wo: Direction, rng: Any) -> tuple[WayOut, Any]:
     """Draw a way in from `wo`, which lies above the surface; also the random numbers, advanced."""
-    w, density, others = [wo], [1.0], [0.0]
+    w, density, others, reverse = [wo], [1.0], [0.0], [1.0]
     spread, smooth = [1.0], 1.0
     crossings: list[_Crossing] = []
     for k, surface in enumerate(layers.surfaces):
@@ -92,8 +97,9 @@ def way_out(types: Any, layers: WalkedLayers, wo: Direction, rng: Any) -> tuple[
         rough = ops.select(surface.smooth, 0.0, 1.0)
         more = ops.divide(inward.density_back, density[k]) * others[k] if k else 0.0
         others.append(ops.minimum(rough + more, events.HUGE))
+        reverse.append(reverse[k] * ops.divide(inward.reverse, inward.density))
     up, down = ([x * s for x, s in zip(weights, spread)] for weights in _sum_reflections(crossings))
-    return WayOut(tuple(w), tuple(up), tuple(down), tuple(density), tuple(others)), rng
+    return WayOut(*map(tuple, (w, up, down, density, others, reverse))), rng
 
 
 def _sum_reflections(crossings: list[_Crossing]) -> tuple[list[Value], list[Value]]:
@@ -131,7 +137,7 @@ def connect_surface(meeting: SurfaceMeeting, event: ScatteringEvent, out: WayOut
     fewer = ops.select(down, 0.0, ops.divide(event.density_back, path.density) * path.chain)
     more = ops.divide(event.density, pick(out.density, j)) * pick(out.others, j)
     passed = pick(out.up, j) * transmittance(layers.slab(j), w[2])
-    return event.weight * passed / (1 + fewer + more)
+    return event.weight * passed * _share(path, out, j, event.reverse, down, fewer + more)
 
 
 def connect_medium(layers: WalkedLayers, out: WayOut, path: Path) -> Value:
@@ -141,9 +147,23 @@ def connect_medium(layers: WalkedLayers, out: WayOut, path: Path) -> Value:
     w = _direction(out, k)
     density = slab.phase.density(ggx.dot(path.w, w))
     more = ops.divide(density, pick(out.density, k)) * pick(out.others, k)
-    upwards = density / (1 + more) * pick(out.up, k) * transmittance(slab, w[2], path.height)
+    upwards = density * pick(out.up, k) * transmittance(slab, w[2], path.height)
+    upwards *= _share(path, out, k, density, True, more)
     density = slab.phase.density(ggx.dot(path.w, (w[0], w[1], -w[2])))
     return upwards + density * pick(out.down, k) * transmittance(slab, w[2], 1 - path.height)
+
+
+def _share(path: Path, out: WayOut, k: Value, reverse: Value, turned: Value, others: Value) -> Value:
+    """Weight of a strategy, where the densities of others from the same end add up to `others` times its own.
+
+    A path that walks from either end by chance has the strategies of both, unless all its events are refractions, not
+    `turned` upwards.
+    """
+    if path.backward is None or path.straight is None:
+        return 1 / (1 + others)
+    from_other_end = (path.backward * reverse + path.straight) * pick(out.reverse, k)
+    refracted = (path.straight > 0) & (turned ^ True)
+    return ops.select(refracted, 1 / (1 + others), 2 / (1 + others + ops.minimum(from_other_end, events.HUGE)))
 
 
 def transmittance(slab: WalkedSlab, cosine: Value, depth: Value = 1.0) -> Value:

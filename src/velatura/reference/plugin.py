@@ -73,12 +73,13 @@ def make(mi: Any) -> type:
 
 @dataclass(frozen=True)
 class Settings:
-    """How paths walk: properties of the plugin, and the least roughness of interfaces."""
+    """How paths walk: properties of the plugin, the least roughness of interfaces, and from either end or from one."""
 
     seed: int
     max_depth: int
     microsurface: bool
     least_alpha: float = 0.0
+    either_end: bool = False
 
     @property
     def facts(self) -> dict[str, str]:
@@ -206,22 +207,26 @@ class WalkedPoint:
     def eval(self, wo: Any, active: Any) -> Any:
         import drjit as dr
 
-        # Walk towards the upper side, by which light leaves
         stack, mi, si, wi = self.stack, self.stack.mi, self.si, self.si.wi
-        flipped = wo.z < 0
         active = active & self._asked(wi.z * wo.z > 0)
         active = active & (True if stack.transmits else (wi.z > 0) & (wo.z > 0)) & stack.glossy
-        layers = stack.layers(si, active, flipped)
         rng = stack.stream(wi.x, wi.y, wo.x, wo.y, si.p.x, si.p.y, si.p.z, si.uv.x, si.uv.y, wo.z)
-        out, rng = way_out(mi, layers, (wo.x, wo.y, dr.abs(wo.z)), rng)
-        seen = (wi.x, wi.y, dr.select(flipped, -wi.z, wi.z))
+        # Walk from either end, towards the upper side, by which light leaves
+        either = stack.settings.either_end
+        turned = rng.next_float32() < 0.5 if either else mi.Bool(False)
+        begin, end = dr.select(turned, wo, wi), dr.select(turned, wi, wo)
+        flipped = end.z < 0
+        layers = stack.layers(si, active, flipped)
+        out, rng = way_out(mi, layers, (end.x, end.y, dr.abs(end.z)), rng)
+        seen = (begin.x, begin.y, dr.select(flipped, -begin.z, begin.z))
         one = layers.start(mi.UnpolarizedSpectrum(1))
-        path = walk(mi, layers, seen, rng, one, active, stack.settings.max_depth, out, self._painted)
+        path = walk(mi, layers, seen, rng, one, active, stack.settings.max_depth, out, self._painted, either_end=either)
         value = layers.seen(path.value, mi.UnpolarizedSpectrum)
-        # Turn energy into radiance
-        if stack.transmits and self.radiance:
+        # Turn it around, and energy into radiance
+        value *= dr.select(turned, dr.abs(wo.z) / dr.maximum(dr.abs(wi.z), 1e-7), 1.0)
+        if stack.transmits:
             scale = dr.select(seen[2] > 0, 1.0, relative_index(layers.index[0], layers.index[-1]))
-            value *= scale * scale
+            value *= dr.select(turned ^ mi.Bool(self.radiance), scale * scale, 1.0)
         return mi.depolarizer(dr.select(active, value, 0))
 
     def pdf(self, wo: Any, active: Any) -> Any:

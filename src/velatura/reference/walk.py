@@ -32,7 +32,9 @@ class Path:
 
     `w` is the direction of travel in slab `slab`; `height` is measured downwards, in depths of the slab; `weight` and
     `value` are colours. `smooth`: only smooth surfaces were met so far; `painted`: the diffuse base was among them.
-    `density` and `chain` weigh the strategies of `connection`, where `value` comes from. `light` is the polarisation
+    `density` and `chain` weigh the strategies of `next_event`, where `value` comes from. So do `backward` and
+    `straight` those of paths from the other end, None where there are none: over the density of what was drawn, the sum
+    of theirs, and while all events were refractions that of refractions without a choice. `light` is the polarisation
     along `w`, None where it is left out.
     """
 
@@ -51,6 +53,8 @@ class Path:
     chain: Value
     value: Value
     light: Polarisation | None
+    backward: Value | None = None
+    straight: Value | None = None
 
 
 def walk(
@@ -64,6 +68,7 @@ def walk(
     out: WayOut | None = None,
     painted: bool | None = None,
     polarised: bool = False,
+    either_end: bool = False,
 ) -> Path:
     """Follow paths that enter along -wi until they leave, die, or have met `max_depth` events.
 
@@ -76,6 +81,8 @@ def walk(
         painted: gathered is from paths that the diffuse base has scattered, from all others (False), or both (None).
         polarised: whether the light, unpolarised at first, is polarised by facets; not together with `out`. Media
             depolarise what they scatter, since their phase function has no Mueller matrix, and so does a diffuse base.
+        either_end: whether half of all paths, by chance, are to be followed from the other end: with `wi` and `out`
+            exchanged. The value is then the mean over both.
 
     Returns:
         The paths as they ended. Those still `alive` were cut off; the others left along `w`, or died with weight 0.
@@ -100,6 +107,8 @@ def walk(
         chain=types.Float(0),
         value=colour * 0,
         light=unpolarised((-wi[0], -wi[1], -wi[2]), colour) if polarised else None,
+        backward=types.Float(0) if either_end else None,
+        straight=types.Float(1) if either_end else None,
     )
     _travel(layers, path)
 
@@ -151,7 +160,8 @@ def _scatter(types: Any, layers: WalkedLayers, path: Path, out: WayOut | None, p
     light = onward.light and onward.light.mirrored(down ^ True)
     chain = ops.select(rough, types.Float(1), 0)
     chain += ops.select(onward.reflected, 0.0, ops.divide(onward.density_back, path.density) * path.chain)
-    weight, density = onward.weight, onward.density
+    weight, density, reverse = onward.weight, onward.density, onward.reverse
+    certain = ops.select(onward.reflected, 0.0, onward.certain)
     slab = ops.select(onward.reflected, path.slab, beyond)
     if layers.scatters:
         phase = layers.slab(path.slab).phase
@@ -165,12 +175,17 @@ def _scatter(types: Any, layers: WalkedLayers, path: Path, out: WayOut | None, p
         )
         weight = ops.select(path.inside, 1.0, weight)
         density = ops.select(path.inside, phase.density(cosine), density)
+        reverse, certain = ops.select(path.inside, density, reverse), ops.select(path.inside, 0.0, certain)
         chain = ops.select(path.inside, 1.0, chain)
         slab = ops.select(path.inside, path.slab, slab)
         light = light and ops.select_record(path.inside, unpolarised(turned, path.weight), light)
     path.smooth &= (rough | path.inside) ^ True
     path.w, path.slab, path.light = ggx.normalize(turned), slab, light
     path.density, path.chain = density, ops.minimum(chain, events.HUGE)
+    if path.backward is not None and path.straight is not None:
+        backward = ops.divide(path.backward * reverse + path.straight, density)
+        path.backward = ops.minimum(backward, events.HUGE)
+        path.straight = ops.minimum(path.straight * ops.divide(certain, density), events.HUGE)
     path.weight = path.weight * weight
     path.deepest = ops.maximum(path.deepest, slab)
 
