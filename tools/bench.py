@@ -49,6 +49,7 @@ SMOKE = {
     "coat": "--sets absorbing",
     "continuity": "--material 'smooth coat' --parameter layer1_alpha --steps 8",
     "diffuse": "--stacks 1 --paths 1000",
+    "exact": "--kinds 'two interfaces' --count 1000 --spp 1 --rounds 2 --size 8",
     "interfaces": "--rounds 2 --most 2 --spp 1 --size 8 --count 64",
     "memory": "--rounds 1 --steps import",
     "metals": "--metals Cu --coats 2",

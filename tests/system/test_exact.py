@@ -1,7 +1,7 @@
 """The form `exact` of `layered`: its samples carry the light that walks find, and their density is the model's.
 
 Light in cells of directions is compared with that of walks, which are followed without any density, by z-tests at a
-level of 1 % for all comparisons together (Sidak 1967). The seeds are fixed.
+level of 1 % for the cells of a stack together (Sidak). The seeds are fixed. `benchmarks/exact.py` has more stacks.
 """
 
 from __future__ import annotations
@@ -10,19 +10,19 @@ from typing import Any
 
 import numpy as np
 import pytest
-from scipy import stats
+from benchmarks import benchmark
 
 import velatura as vt
 from velatura import Diffuse, Interface, Medium, Stack, kernel
 from velatura.errors import InvalidInput
-from velatura.stack import dumps
 
 mi = kernel.mitsuba("llvm_ad_rgb")
 import drjit as dr  # noqa: E402
 
 vt.register()
 
-LEVEL = 0.01
+exact = benchmark("exact")
+
 WO = mi.Vector3f(-0.6, 0.0, 0.8)
 COUNT = 150_000
 METAL = [Interface(eta=1.5, alpha=0.2), Interface(eta=0.2, k=3.9, alpha=0.3)]
@@ -42,50 +42,27 @@ CASES = {
 }
 
 
-def exact(layers: list, reflectance: str = "fgd") -> Any:
-    material = dumps(Stack(layers), "json")
-    return mi.load_dict({"type": "layered", "material": material, "reflectance": reflectance, "form": "exact"})
+def plugins(layers: list, reflectance: str = "fgd") -> dict[str, Any]:
+    return exact.bsdfs(Stack(layers), reflectance == "fgd-multi")
 
 
-def interactions(cosine: float, count: int) -> Any:
-    si = dr.zeros(mi.SurfaceInteraction3f, count)
+def made(layers: list, reflectance: str = "fgd") -> Any:
+    return mi.load_dict(plugins(layers, reflectance)["exact"])
+
+
+def direction(cosine: float) -> list[float]:
     sine = float(np.sqrt(1 - cosine * cosine))
-    si.wi = mi.Vector3f(sine * 0.8, sine * 0.6, cosine)
-    dr.make_opaque(si.wi)  # one kernel for all directions
-    si.uv = mi.Point2f(dr.arange(mi.Float, count) / count, 0.5)
-    return si
-
-
-def drawn(bsdf: Any, cosine: float, count: int = COUNT, seed: int = 3) -> tuple[np.ndarray, np.ndarray]:
-    """Directions and weights of samples, but those of mirrors, of energy."""
-    rng, context = mi.PCG32(count, seed), mi.BSDFContext(mi.TransportMode.Importance)
-    u = [rng.next_float32() for _ in range(3)]
-    bs, weight = bsdf.sample(context, interactions(cosine, count), u[0], mi.Point2f(u[1], u[2]))
-    rough = (bs.sampled_type & mi.UInt32(+mi.BSDFFlags.Delta)) == 0
-    return np.array(bs.wo), np.array(weight & rough, float)
-
-
-def cells(wo: np.ndarray, weight: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Light by cell of directions and colour, and its standard error."""
-    place = np.clip((wo[2] + 1) * 3, 0, 5).astype(int) * 4 + (np.arctan2(wo[1], wo[0]) / np.pi * 2 + 2).astype(int) % 4
-    first, second = (np.array([np.bincount(place, w**p, 24) for w in weight]) / len(place) for p in (1, 2))
-    return first, np.sqrt(np.maximum(second - first**2, 0) / len(place))
-
-
-def deviations(a: tuple[np.ndarray, np.ndarray], b: tuple[np.ndarray, np.ndarray]) -> np.ndarray:
-    """z of cells with enough light for a normal distribution."""
-    known = (b[0] > 0.005) & (a[1] < 0.1 * a[0])
-    return (a[0] - b[0])[known] / np.hypot(a[1], b[1])[known]
+    return [sine * 0.8, sine * 0.6, cosine]
 
 
 @pytest.mark.parametrize("name", CASES)
 def test_samples_carry_the_light_of_walks(name: str) -> None:
     layers, reflectance, cosine = CASES[name]
-    often = reflectance == "fgd-multi"
-    walk = {"type": "layered_reference", "material": dumps(Stack(rough(layers)), "json"), "microsurface": often}
-    z = deviations(cells(*drawn(exact(layers, reflectance), cosine)), cells(*drawn(mi.load_dict(walk), cosine)))
+    walk = mi.load_dict(plugins(rough(layers), reflectance)["walk"])
+    each = (exact.drawn(mi, bsdf, direction(cosine), COUNT, 3) for bsdf in (made(layers, reflectance), walk))
+    z = exact.deviations(*(exact.cells(*found) for found in each))
     assert len(z) >= 12
-    assert np.abs(z).max() < stats.norm.isf((1 - (1 - LEVEL) ** (1 / len(z))) / 2)
+    assert np.abs(z).max() < exact.bound(len(z))
 
 
 def rough(layers: list) -> list:
@@ -94,25 +71,25 @@ def rough(layers: list) -> list:
 
 
 def test_a_bias_of_one_percent_is_found() -> None:
-    """In all light of one stack; `benchmarks/exact.py` has others."""
-    count, walk = 400_000, mi.load_dict({"type": "layered_reference", "material": dumps(Stack(METAL), "json")})
-    a, b = (drawn(bsdf, 0.7, count)[1][0] for bsdf in (exact(METAL), walk))
+    """In all light of one stack."""
+    count, walk = 400_000, mi.load_dict(plugins(METAL)["walk"])
+    a, b = (exact.drawn(mi, bsdf, direction(0.7), count, 3)[1][0] for bsdf in (made(METAL), walk))
     error = np.hypot(a.std(), b.std()) / np.sqrt(count)
     assert abs(a.mean() - b.mean()) < 3 * error
     assert abs(1.01 * a.mean() - b.mean()) > 3 * error
 
 
 def test_a_single_interface_has_no_noise() -> None:
-    bsdf = exact([Interface(eta=0.2, k=3.9, alpha=0.3)])
-    value = np.array(bsdf.eval(mi.BSDFContext(), interactions(0.7, 100), WO))
+    bsdf = made([Interface(eta=0.2, k=3.9, alpha=0.3)])
+    value = np.array(bsdf.eval(mi.BSDFContext(), exact.interactions(mi, direction(0.7), 100), WO))
     theirs = {"type": "roughconductor", "distribution": "ggx", "alpha": 0.3, "eta": 0.2, "k": 3.9}
-    other = mi.load_dict(theirs).eval(mi.BSDFContext(), interactions(0.7, 1), WO)
+    other = mi.load_dict(theirs).eval(mi.BSDFContext(), exact.interactions(mi, direction(0.7), 1), WO)
     assert np.allclose(value, np.array(other), rtol=1e-4)
 
 
 def test_components_add_up() -> None:
     """Light of the base, and all other reflected light, of the same walks."""
-    bsdf, si = exact(PAINT), interactions(0.7, 1000)
+    bsdf, si = made(PAINT), exact.interactions(mi, direction(0.7), 1000)
     wo = mi.warp.square_to_cosine_hemisphere(mi.Point2f(mi.PCG32(1000).next_float32(), 0.3))
     values = []
     for component in (0xFFFFFFFF, 0, 1):
@@ -131,14 +108,14 @@ def test_gradients_are_those_of_the_model() -> None:
         dr.enable_grad(alpha)
         parameters["layer1_alpha_u"] = parameters["layer1_alpha_v"] = alpha
         parameters.update()
-        value = bsdf.eval(mi.BSDFContext(), interactions(0.7, 100), WO)
+        value = bsdf.eval(mi.BSDFContext(), exact.interactions(mi, direction(0.7), 100), WO)
         dr.backward(dr.mean(value.x))
         found.append(dr.grad(alpha)[0])
     assert found[0] == pytest.approx(found[1], rel=1e-4) and found[1] != 0
 
 
 def test_smooth_stacks_are_mirrors() -> None:
-    bsdf = exact([Interface(eta=1.5), Interface(eta=0.2, k=3.9)])
+    bsdf = made([Interface(eta=1.5), Interface(eta=0.2, k=3.9)])
     assert bsdf.flags() & int(mi.BSDFFlags.DeltaReflection)
 
 
