@@ -3,7 +3,8 @@
 Agreement: light of samples in 24 cells of directions, against that of walks, by z-tests at .01 for all cells of all
 stacks together (Sidak); and all light, with 1 % more, as far as samples tell that from chance. Pictures: spheres in the
 studio by path tracing, rounds interleaved; noise is the standard deviation of a pixel over rounds (root mean square,
-and median over pixels), cost is processor time, and error at equal time is noise times the root of time.
+and median over pixels), cost is processor time, and error at equal time is noise times the root of time: of the model
+noise alone, as the least that estimates of walks can reach.
 
     python benchmarks/exact.py [--of-each 1] [--kinds "two interfaces" ...] [--count 262144] [--spp 16] [--rounds 6]
         [--size 96] [--parts agreement pictures]
@@ -105,7 +106,7 @@ def agreement(mi: Any, cases: Iterable[Case], count: int) -> None:
 
 
 def pictures(mi: Any, cases: Iterable[Case], spp: int, rounds: int, size: int) -> None:
-    ratios: dict[str, list[float]] = {}
+    ratios: dict[tuple[str, str], list[float]] = {}
     for case in cases:
         images: dict[str, list[Array]] = {}
         seconds: dict[str, list[float]] = {}
@@ -123,25 +124,18 @@ def pictures(mi: Any, cases: Iterable[Case], spp: int, rounds: int, size: int) -
         noise = {name: float(np.sqrt(np.mean(each))) for name, each in variance.items()}
         usual = {name: float(np.sqrt(np.median(each.mean(axis=-1)))) for name, each in variance.items()}
         cost = {name: float(np.median(each)) for name, each in seconds.items()}
+        over_walk = {name: noise[name] * (cost[name] / cost["walk"]) ** 0.5 / noise["walk"] for name in noise}
         measured = {
-            "noise at equal samples, over the model's": noise["exact"] / noise["model"],
-            "the same of the walk": noise["walk"] / noise["model"],
-            "noise of the median pixel, over the model's": usual["exact"] / usual["model"],
-            "the same of the walk ": usual["walk"] / usual["model"],
-            "time of a picture, over the model's": cost["exact"] / cost["model"],
-            "time of the walk's": cost["walk"] / cost["model"],
-            "error at equal time, over the walk's": noise["exact"]
-            / noise["walk"]
-            * (cost["exact"] / cost["walk"]) ** 0.5,
-            "error of the model's noise, over the walk's": noise["model"]
-            / noise["walk"]
-            * (cost["model"] / cost["walk"]) ** 0.5,
+            (title, name): values[name] / values["model"]
+            for title, values in (("noise", noise), ("noise of the median pixel", usual), ("time", cost))
+            for name in ("exact", "walk")
         }
+        measured |= {("error at equal time", name): over_walk[name] for name in ("exact", "model")}
         print(f"{case.id:24s} {' '.join(f'{x:.2f}' for x in measured.values())}", flush=True)
-        for name, x in measured.items():
-            ratios.setdefault(name, []).append(x)
-    for name, each in ratios.items():
-        row("picture", name.strip(), each, "")
+        for named, x in measured.items():
+            ratios.setdefault(named, []).append(x)
+    for (title, name), each in ratios.items():
+        row("picture", f"{title}, {name}", each, "x the walk's" if title.startswith("error") else "x the model's")
 
 
 def main() -> None:
