@@ -19,8 +19,10 @@ from velatura.reference.plugin import Settings, WalkedPoint, WalkedStack
 
 _MAX_DEPTH = 1000
 
-#: Laws of `velatura.checks` that walks do not keep, and this does, since its samples are those of the model.
+#: Laws of `velatura.checks` that walks do not keep, and this does, since its samples are those of the model; and those
+#: that it does not. It is reciprocal, but few pairs of directions have most of its noise, which is far from normal.
 KEPT = frozenset({"normalisation", "chi-square", "weights"})
+NOT_KEPT = frozenset({"spread", "reciprocity"})
 
 
 class ExactStack(LayeredStack):
@@ -37,7 +39,7 @@ class ExactStack(LayeredStack):
 
     @property
     def exceptions(self) -> frozenset[str]:
-        return super().exceptions if self.delta else (self.walked.exceptions - KEPT) | {"spread"}
+        return super().exceptions if self.delta else (self.walked.exceptions - KEPT) | NOT_KEPT
 
     def _update(self, before: bodies.Bodies | None) -> None:
         super()._update(before)
