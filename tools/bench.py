@@ -59,6 +59,7 @@ SMOKE = {
     "preparation": "--rounds 2 --presets bare-gold --kinds isotropic",
     "reference": "--part statistics --paths 1000",
     "render": "--rounds 2 --spp 1 --size 8 --count 64 --model bati2021",
+    "solvers": "--wishes 2 --model bati2021",
     "startup": "--rounds 1 --only 'velatura --help'",
 }
 

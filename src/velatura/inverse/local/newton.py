@@ -1,4 +1,8 @@
-"""Newton's method from a stack to one that has given lobes, within the bounds on its coordinates."""
+"""Newton's method from a stack to one that has given lobes, within the bounds on its coordinates.
+
+SciPy's `least_squares` with the same bounds and slopes meets as many wishes, by `bati2021`, in 2.8 times the processor
+time (dogbox; 4.3 times by trf; `benchmarks/solvers.py --model bati2021`), and reports no bound that is in the way.
+"""
 
 from __future__ import annotations
 
