@@ -85,6 +85,7 @@ DIFFUSE_ALPHA = 0.5, 0.9  # roughness from which scattering is diffuse in part, 
 
 WIDE_ROUGHEST = 0.1, 0.2  # roughness of the roughest interface
 WIDE_SECOND = 0.01, 0.03  # step of the logarithm of the index of another one
+WIDE_STRAIGHT = 0.03, 0.1  # roughness of the second one, for light that goes straight through
 WIDE_STEP = 0.1  # of the logarithm of the index, below which an interface counts as a smoother one
 WIDE_STRETCH = 1.1, 1.5  # ratio of two roughnesses up to which an interface counts, and from which none does
 WIDE_SOLID = (

@@ -241,7 +241,7 @@ class SideView:
         through, or its weight."""
         passes = self.columns.passes
         assert self.transmission and passes
-        passes = replace(passes, straight=passes.narrow * (1.0 if whole else passes.straight))
+        passes = replace(passes, straight=passes.faceted * (1.0 if whole else passes.straight))
         found, density = combined.eval_pdf(self.transmission, passes, i, o)
         if self.columns.wide_passed:
             energy, *numbers = self.columns.wide_passed

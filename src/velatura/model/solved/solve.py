@@ -395,7 +395,8 @@ class Solver:
         numbers = np.array([self._colours(number)[:, 0] for number in found])
         if self.wide and transmission:
             inner = [lobe.interface > 0 for lobe in layout.lobes]
-            columns, shares = wide_light.columns(columns, wide.share(material), inner, light, transmission, folded)
+            wide_shares = wide.share(material), wide.straight_share(material)
+            columns, shares = wide_light.columns(columns, *wide_shares, inner, light, transmission, folded)
             lit = Lit(self._in_numpy(material, numbers, layout, None), columns, folded.directions)
             columns = wide_light.shared(columns, shares, lit.view, folded)
         edged = self._edged(material, lobes, folded.phi)
@@ -423,6 +424,9 @@ class Solver:
             events=layout.top is not None,
             modes=len(wide.TERMS) if self.wide else MODES,
         )
+        if self.wide:
+            straight = wide.straight_share(material) * (solved.passing - solved.around)
+            solved = replace(solved, passing=solved.around + straight)
         by_node = "remainder", "around", "again"
         few = {name: getattr(solved, name)[:, :MODES, :, : len(incidences)] for name in by_node}
         solved = replace(solved, **few)

@@ -169,7 +169,8 @@ def _bounded(found: Columns, summed: bool) -> Columns:
         of = replace(of, **weights, **dict(zip(Parts.CHANCES, (x / total for x in passes))))
         if found.wide_passed:
             crowded = ops.clip(of.forward, 0.0, wide_light.CROWDED_MOST)
-            of = replace(of, forward=crowded, narrow=ops.clip(of.narrow, 0.0, 1.0))
+            kept = {name: ops.clip(getattr(of, name), 0.0, 1.0) for name in ("narrow", "faceted")}
+            of = replace(of, forward=crowded, **kept)
     return replace(
         found,
         weights=[ops.maximum(x, 0.0) for x in found.weights],

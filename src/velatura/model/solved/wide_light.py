@@ -43,16 +43,18 @@ def cosines(folded: Folded | Listed) -> Array:
 def columns(
     found: Columns,
     share: float,
+    of_straight: float,
     inner: Sequence[bool],
     light: Energies,
     transmission: Transmission,
     folded: Folded | Listed,
 ) -> tuple[Columns, Array]:
     """Columns of a side of which waves have a share of the light at most, and what they have (M,), of what is reflected
-    or of what passes, whichever is more. Numbers are known where waves have nothing, too.
+    or of what passes, whichever is more. Numbers are known where waves have nothing, too. Of what goes straight through
+    waves have the share `of_straight` that they have of all that passes.
 
     `inner` says of each lobe whether it is of another interface than the first. `light` is known at `cosines` after
-    `INCIDENCES`.
+    `INCIDENCES`, and its `passing` has that share of what goes straight through.
     """
     assert found.passes and found.passed is not None
     beyond, passing = (ops.mean(each)[..., len(INCIDENCES) :] for each in (light.beyond, light.passing))
@@ -63,13 +65,17 @@ def columns(
     passed, through = wide.fit(light.nodes, passing, bound, internal_reflections.seen_below(transmission, wi)[0])
     back, through = (share * folded.around(each) for each in (back, through))
     handed = sum((energy for energy, each in zip(found.energies, inner) if each), 0 * found.rest)
+    energy = found.passed
+    if of_straight < 1:
+        kept = (1 - of_straight) * found.passes.straight
+        energy = np.maximum(energy - kept * direct.integrals(transmission, folded.directions)[0], 0)
     crowded = folded.around(_forward(passed, internal_reflections.seen_below(transmission, folded.at_cosines)))
     narrowed = replace(
         found,
-        passes=replace(found.passes, narrow=1 - through, forward=through * crowded),
+        passes=replace(found.passes, narrow=1 - through, faceted=1 - of_straight * through, forward=through * crowded),
         narrow=1 - back,
         wide_reflected=[found.rest + handed, *folded.around(reflected)],
-        wide_passed=[found.passed, *folded.around(passed)],
+        wide_passed=[energy, *folded.around(passed)],
     )
     return narrowed, np.maximum(back, through)
 
@@ -78,7 +84,7 @@ def none(found: Columns) -> Columns:
     """Columns of a side without such light, in the declaration of sides that have some."""
     assert found.passes
     nothing, whole = [0 * found.rest, *[0 * found.chance] * wide.COUNT], 0 * found.chance + 1
-    passes = replace(found.passes, forward=0 * found.chance, narrow=whole)
+    passes = replace(found.passes, forward=0 * found.chance, narrow=whole, faceted=whole)
     return replace(found, passes=passes, narrow=whole, wide_reflected=nothing, wide_passed=nothing)
 
 

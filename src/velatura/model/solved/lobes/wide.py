@@ -50,20 +50,32 @@ def share(material: Material) -> float:
     trapped."""
     if not material.transmits:
         return 0.0
+    (rough, _), (_, step), round_, pane = _faces(material)
+    return float(pane * _smooth(rough, fitted.WIDE_ROUGHEST) * _smooth(step, fitted.WIDE_SECOND) * round_)
+
+
+def straight_share(material: Material) -> float:
+    """Share of light that goes straight through, of what may have this shape: the more, the more the second roughest
+    interface turns it; with one alone the lobe of that is exact."""
+    return float(_smooth(_faces(material)[1][0], fitted.WIDE_STRAIGHT))
+
+
+def _faces(material: Material) -> tuple[tuple[float, float], tuple[float, float], float, float]:
+    """Of the roughest interface, and at most of another one, how much they turn light, and the step of the logarithm of
+    the index; from 0 to 1, how alike all are along both axes, and whether the index below is that above."""
     outside = float(ops.mean(np.ravel(material.exterior)))
-    n, roughest, second, round_ = outside, (0.0, 0.0), 0.0, 1.0
+    n, found, round_ = outside, [(0.0, 0.0)] * 2, 1.0
     for layer in material.solid().layers:
         if not isinstance(layer, InterfaceValues):
             continue
         above, n = n, float(ops.mean(np.ravel(layer.eta)))
         low, high = sorted((max(float(layer.alpha_u), ALPHA_MIN), max(float(layer.alpha_v), ALPHA_MIN)))
         step = abs(np.log(n / above))
-        found = low * min(step / fitted.WIDE_STEP, 1.0), step
-        second = max(second, min(roughest, found)[1])
-        roughest = max(roughest, found)
+        found.append((low * min(step / fitted.WIDE_STEP, 1.0), step))
         round_ = min(round_, 1 - _smooth(high / low, fitted.WIDE_STRETCH))
-    pane = 1 - _smooth(abs(np.log(n / outside)), fitted.WIDE_SOLID)
-    return float(pane * _smooth(roughest[0], fitted.WIDE_ROUGHEST) * _smooth(second, fitted.WIDE_SECOND) * round_)
+    roughest, *others = sorted(found, reverse=True)
+    second = others[0][0], max(step for _, step in others)
+    return roughest, second, round_, 1 - _smooth(abs(np.log(n / outside)), fitted.WIDE_SOLID)
 
 
 def _smooth(x: Any, ends: tuple[float, float]) -> Any:

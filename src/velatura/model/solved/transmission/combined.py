@@ -43,11 +43,12 @@ Array = NDArray[np.floating]
 class Parts(ops.NamedFields):
     """Light from one direction that passes: weights (colours) of what goes straight through, of what bounces, and of
     what is scattered, and the probabilities of sampling them; reflected lobes are sampled else. What is scattered has
-    numbers of its own. Where light is wide, what is scattered is drawn `forward`, and all keep the share `narrow`."""
+    numbers of its own. Where light is wide, what is scattered is drawn `forward`, what goes straight through keeps the
+    share `faceted`, and all else the share `narrow`."""
 
     COLOURS: ClassVar = ("straight", "bounced", "rest")
     CHANCES: ClassVar = ("of_straight", "of_bounced", "of_rest")
-    OF_WIDE: ClassVar = ("forward", "narrow")
+    OF_WIDE: ClassVar = ("forward", "narrow", "faceted")
 
     straight: Value
     bounced: Value
@@ -62,6 +63,7 @@ class Parts(ops.NamedFields):
     twice: Value = EVEN[4]
     forward: Value = 0.0
     narrow: Value = 1.0
+    faceted: Value = 1.0
 
     @property
     def numbers(self) -> list[Value]:
