@@ -54,7 +54,7 @@ def test_python_exports_what_the_command_writes(run: Run, tmp_path: Path) -> Non
         facts = [made.described(written[0]).encode()] if made.facts else []
         assert [path.read_bytes() for path in written] == [made.text.encode(), *made.beside.values(), *facts]
     files = {path.name for path in tmp_path.iterdir()}
-    described = {f"gold.{ending}" for ending in ("glsl", "hlsl", "osl", "slang", "wgsl", "mtlx", "py", "xml")}
+    described = {f"gold.{ending}" for ending in ("glsl", "hlsl", "js", "osl", "slang", "wgsl", "mtlx", "py", "xml")}
     assert files == described | {f"{name}.json" for name in described} | {"gold.json", "gold.tables.bin"}
     with pytest.raises(vt.InvalidInput, match="unknown format 'oslo'"):
         vt.export("coated-gold", "oslo")
@@ -114,6 +114,16 @@ def test_facts_state_the_loss_that_the_file_states(to: str, tmp_path: Path) -> N
     stated = [f"{100 * each['variation']:.1f}" if to == "gltf" else f"{each['variation']:.3f}" for each in loss]
     text = " ".join(made.notes) if to == "gltf" else made.text
     assert all(number in text for number in stated)
+
+
+def test_three_refuses_textures_in_one_line(run: Run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Expected: the value is named, and nothing written."""
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "rough.png").touch()
+    (tmp_path / "gold.yaml").write_text("layers:\n  - interface: {conductor: Au, alpha: {texture: rough.png}}\n")
+    status, _, err = run("export", "gold.yaml", "--to", "three", "-o", "gold.js")
+    assert status == 2 and err.count("\n") == 1 and "layer0_alpha" in err
+    assert not (tmp_path / "gold.js").exists()
 
 
 def test_shared_tables_that_code_does_not_read_are_reported(run: Run, tmp_path: Path) -> None:
@@ -217,7 +227,7 @@ def test_films_are_exported(to: str, run: Run, tmp_path: Path) -> None:
         assert vt.Stack.from_dict(found["material"]) == stack
         assert found["values"]["layer1_film0_eta"] == [1.4, 1.46, 1.5]
         assert found["values"]["layer0_film0_thickness_nm"] == 200
-    elif to in ("osl", "blender", "mtlx"):
+    elif to in ("osl", "blender", "mtlx", "three"):
         assert "by the model velatura" in path.read_text()
     elif to == "python":
         assert runpy.run_path(str(path))["stack"] == stack

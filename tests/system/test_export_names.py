@@ -8,6 +8,7 @@ code that remains without comments and strings, by the strictest reading of both
 from __future__ import annotations
 
 import ast
+import functools
 import json
 import re
 from collections.abc import Callable, Iterator
@@ -22,7 +23,9 @@ import pytest
 from machines import MACHINES
 
 import velatura as vt
-from velatura.exports import FORMATS, baked, klems
+from velatura.exports import FORMATS, baked, klems, three
+from velatura.exports.request import Request
+from velatura.model import named
 from velatura.stack import Texture
 
 HARMLESS = "Plain paint"
@@ -38,7 +41,7 @@ CONTROL = ["\n", "\r", "a\0", "\x1b[2J", "\x7f", "\x85", "\u2028", "\u2029", "\u
 MODEL = "belcour2018"
 
 TEXTS = [name for name, each in FORMATS.items() if each.is_text]
-PAINTED = [name for name in TEXTS if name != "bsdf-xml"]  # which has no textures
+PAINTED = [name for name in TEXTS if name not in ("bsdf-xml", "three")]  # which have no textures
 
 Structure = Callable[[str], Any]
 
@@ -108,6 +111,9 @@ def fitted_once(monkeypatch: pytest.MonkeyPatch) -> None:
         return replace(made, name=stack.name, images=images)
 
     monkeypatch.setattr(baked, "bake", of_any_name)
+    of_parts, harmless = three.environment, Request("three", painted(), named(MODEL), {}, None, {})
+    parts = functools.cache(lambda: of_parts(harmless))
+    monkeypatch.setattr(three, "environment", lambda request: parts())
     nothing = np.zeros((klems.PATCHES, klems.PATCHES))
     monkeypatch.setattr(klems, "sides", lambda bsdf, side: (nothing, nothing))
 

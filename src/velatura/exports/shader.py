@@ -64,12 +64,12 @@ def write(request: Request) -> Export:
         costs={name: str(cost) for name, cost in made.costs.items()},
         notes=notes if shared is not None and not apart else (),
         apart=apart,
-        facts=_facts(made, printer.language, request.folder),
+        facts=facts_of(made, printer.language, request.folder),
         textures=textures,
     )
 
 
-def _facts(made: Shader, language: str, folder: Path | None) -> dict[str, Any]:
+def facts_of(made: Shader, language: str, folder: Path | None) -> dict[str, Any]:
     """The language, the models that the code is of, its functions with their costs, the values of the struct, and the
     images that samplers read."""
     return {

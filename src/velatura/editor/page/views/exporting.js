@@ -14,6 +14,7 @@ const GROUPS = {
     'blender-principled': 'Blender, Principled BSDF',
     openpbr: 'OpenPBR, MaterialX',
     gltf: 'glTF 2.0',
+    three: 'three.js, material',
     mtlx: 'MaterialX, by closures',
     'mitsuba-principled': 'Mitsuba 3, principled',
     'mitsuba-xml': 'Mitsuba 3, this plugin',

@@ -1,0 +1,217 @@
+"""Exported modules for three.js in headless Chromium, a ball each; and the same by samples of the model."""
+
+from __future__ import annotations
+
+import base64
+import io
+import re
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from typing import Any
+
+import chromium
+import numpy as np
+from numpy.typing import NDArray
+from PIL import Image
+from scipy.ndimage import map_coordinates
+
+import velatura as vt
+from velatura.editor import bundle
+from velatura.model import named
+from velatura.model.base import Query
+from velatura.model.side_by_side import SideBySide
+from velatura.renderer.low_discrepancy import at_nodes
+from velatura.stack import Material, MaterialLike
+
+Array = NDArray[np.floating]
+
+RADIUS = 0.98
+THREE = bundle.SOURCES / "node_modules" / "three"
+ADDRESS = "http://three.test/"
+NETWORK = "https://unpkg.com/three@[0-9.]+/"
+PAGE = """<!doctype html><script type="importmap">{"imports": {"three": "/build/three.module.js"}}</script>"""
+
+DRAW = """
+async (job) => {
+  const THREE = await import('three');
+  const { LayeredMaterial } = await import(job.module);
+  const floats = new Float32Array(Uint8Array.from(atob(job.sky), (letter) => letter.charCodeAt(0)).buffer);
+  const sky = new THREE.DataTexture(floats, job.width, job.height, THREE.RGBAFormat, THREE.FloatType);
+  sky.mapping = THREE.EquirectangularReflectionMapping;
+  sky.minFilter = sky.magFilter = THREE.LinearFilter;
+  sky.wrapS = THREE.RepeatWrapping;
+  sky.needsUpdate = true;
+  const renderer = new THREE.WebGLRenderer({ canvas: document.createElement('canvas') });
+  const complaints = [];
+  renderer.debug.onShaderError = (gl, program, vertex, fragment) =>
+    complaints.push(gl.getShaderInfoLog(vertex), gl.getShaderInfoLog(fragment), gl.getProgramInfoLog(program));
+  const scene = new THREE.Scene(), camera = new THREE.OrthographicCamera(-1, 1, 1, -1, 0.1, 10);
+  camera.position.z = 4;
+  const material = new LayeredMaterial();
+  const ball = new THREE.Mesh(new THREE.SphereGeometry(job.radius, 192, 96), material);
+  ball.rotation.x = job.tilt;
+  scene.add(ball);
+  if (job.light) {
+    const light = new THREE.DirectionalLight(0xffffff, 1);
+    light.position.set(...job.light);
+    scene.add(light);
+  } else scene.environment = sky;
+  const target = new THREE.WebGLRenderTarget(job.size, job.size, { type: THREE.FloatType });
+  renderer.setRenderTarget(target);
+  renderer.setClearColor(0, 0);
+  renderer.render(scene, camera);
+  const pixels = new Float32Array(4 * job.size * job.size);
+  renderer.readRenderTargetPixels(target, 0, 0, job.size, job.size, pixels);
+  let text = '';
+  const bytes = new Uint8Array(pixels.buffer);
+  for (let i = 0; i < bytes.length; i += 4096) text += String.fromCharCode(...bytes.subarray(i, i + 4096));
+  const revision = THREE.REVISION;
+  renderer.dispose();
+  renderer.forceContextLoss();
+  return { pixels: btoa(text), complaints, revision };
+}
+"""
+
+
+@dataclass(frozen=True)
+class Stage:
+    """A page with three.js, in which balls are drawn."""
+
+    page: Any
+    files: dict[str, str]
+
+    def ball(
+        self,
+        module: str,
+        sky: Array,
+        size: int = 96,
+        light: tuple[float, float, float] | None = None,
+        tilt: float = 0.0,
+    ) -> Array:
+        """A ball, linear colours and coverage (size, size, 4), from the top.
+
+        Args:
+            module: text of an export to three.
+            sky: environment (height, width, 3), from the top, y up, in three's coordinates.
+            light: direction of a light in place of the environment.
+        """
+        name = f"{len(self.files)}.js"
+        self.files[name] = module
+        rgba = np.pad(sky[::-1], ((0, 0), (0, 0), (0, 1)), constant_values=1).astype("<f4")
+        found = self.page.evaluate(
+            DRAW,
+            {
+                "module": f"/{name}",
+                "sky": base64.b64encode(rgba.tobytes()).decode(),
+                "width": sky.shape[1],
+                "height": sky.shape[0],
+                "size": size,
+                "radius": RADIUS,
+                "light": light,
+                "tilt": tilt,
+            },
+        )
+        assert not found["complaints"], "\n".join(filter(None, found["complaints"]))
+        pixels = np.frombuffer(base64.b64decode(found["pixels"]), np.float32).reshape(size, size, 4)
+        return pixels[::-1]
+
+    def visit(self, name: str, size: int = 64) -> tuple[Array, list[str]]:
+        """A page of the files when it has drawn, sRGB from 0 to 255 (size, size, 3), and what its console says."""
+        page, said = self.page.context.browser.new_page(), list[str]()
+
+        def listen(message: Any) -> None:
+            if "GPU stall" not in message.text:  # which drivers say of the screenshot
+                said.append(message.text)
+
+        page.on("console", listen)
+        page.on("pageerror", lambda error: said.append(str(error)))
+        page.set_viewport_size({"width": size, "height": size})
+        self.serve(page)
+        page.goto(ADDRESS + name)
+        page.wait_for_function("document.querySelector('canvas')")
+        page.evaluate("() => new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(done)))")
+        picture = np.asarray(Image.open(io.BytesIO(page.screenshot())).convert("RGB"))
+        page.close()
+        return picture, said
+
+    def serve(self, page: Any) -> None:
+        """Give a page the files, and three.js in place of the network."""
+
+        def answer(route: Any) -> None:
+            name = re.sub(rf"^{ADDRESS}|^{NETWORK}", "", route.request.url)
+            path = THREE / name
+            kind = "text/html" if name.endswith("html") else "text/javascript"
+            if name in self.files:
+                route.fulfill(body=self.files[name], content_type=kind)
+            elif path.is_file():
+                route.fulfill(body=path.read_text(encoding="utf-8"), content_type=kind)
+            else:
+                route.fulfill(status=404, body="")
+
+        page.route("**", answer)
+
+
+@contextmanager
+def stage() -> Iterator[Stage]:
+    """A page for as long as the block runs."""
+    with chromium.browser() as browser:
+        opened = Stage(browser.page, {"index.html": PAGE})
+        opened.serve(browser.page)
+        browser.page.goto(f"{ADDRESS}index.html")
+        yield opened
+
+
+def sampled(material: MaterialLike, sky: Array, size: int, samples: int, tilt: float = 0.0) -> Array:
+    """The same ball by means of so many samples of the model for each pixel, in NumPy."""
+    across = (np.arange(size) + 0.5) / size * 2 - 1
+    x, y = across / RADIUS, -across[:, None] / RADIUS
+    inside = x**2 + y**2 < 1
+    x, y = np.broadcast_to(x, inside.shape)[inside], np.broadcast_to(y, inside.shape)[inside]
+    n = np.stack([x, y, np.sqrt(1 - x**2 - y**2)])
+
+    # The frame of the sphere: its tangent lies along its circles of latitude
+    up = np.array([0, np.cos(tilt), np.sin(tilt)])
+    t = np.cross(up, n, axisb=0).T
+    t /= np.maximum(np.linalg.norm(t, axis=0), 1e-9)
+    frame = np.stack([t, np.cross(n, t, axis=0), n])
+    wi = tuple(np.repeat(frame[:, 2], samples, axis=1))
+    count = n.shape[1]
+    u, u1, u2 = (np.random.default_rng(5).random((3, count, 1)) + np.array(at_nodes(1, samples))[:, None]) % 1
+    body = SideBySide.of([(1, Material.of(vt.load(material)))], named("velatura"))
+    asked = Query(radiance=False)
+    wo = body.sample(wi, u.ravel(), u1.ravel(), u2.ravel(), asked)
+    value, density = body.eval_pdf(wi, wo, asked)
+    weight = np.where(density > 0, value / np.where(density > 0, density, 1), 0)
+    w = np.einsum("kan,kns->ans", frame, np.reshape(np.broadcast_arrays(*wo), (3, count, samples)))
+    light = (np.reshape(np.broadcast_to(weight, (3, count * samples)), (3, count, samples)) * looked_up(sky, w)).mean(
+        axis=-1
+    )
+    picture = np.zeros((size, size, 4))
+    picture[inside] = np.concatenate([light, np.ones((1, count))]).T
+    return picture
+
+
+def looked_up(sky: Array, w: Array) -> Array:
+    """Radiance (3, ...) of an environment in directions, as three.js reads it."""
+    height, width, _ = sky.shape
+    column = (np.arctan2(w[2], w[0]) / (2 * np.pi) + 0.5) * width - 0.5
+    row = (0.5 - np.arcsin(np.clip(w[1], -1, 1)) / np.pi) * height - 0.5
+    channels = [
+        map_coordinates(c, [np.clip(row, 0, height - 1), column], order=1, mode="grid-wrap")
+        for c in np.moveaxis(sky, -1, 0)
+    ]
+    return np.stack(channels)
+
+
+def matched(truth: Array, found: Array) -> float:
+    """Root mean square of the difference of two pictures as displays have them, sRGB from 0 to 1, over pixels that both
+    cover; the exposure brings the mean of the first to .25."""
+    inside = (truth[..., 3] > 0) & (found[..., 3] > 0)
+    scale = 0.25 / truth[inside, :3].mean()
+
+    def shown(picture: Array) -> Array:
+        x = np.clip(picture[inside, :3] * scale, 0, 1)
+        return np.where(x <= 0.0031308, 12.92 * x, 1.055 * x ** (1 / 2.4) - 0.055)
+
+    return float(np.sqrt(np.mean((shown(truth) - shown(found)) ** 2)))
