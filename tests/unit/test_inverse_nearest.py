@@ -175,3 +175,21 @@ def test_a_bound_is_the_same_under_the_hand_and_at_rest() -> None:
     brightest = fresnel.normal_incidence(np.divide(metal.eta, coat.eta), np.divide(metal.k, coat.eta)).max()
     assert brightest == pytest.approx(CONDUCTOR_MAX, abs=1e-6)
     assert np.array(rest.reached.lobes[1].colour) == pytest.approx(now.lobes[1].colour, abs=2e-3)
+
+
+def test_a_wish_far_beyond_what_is_possible_is_approached_by_a_part_of_it() -> None:
+    """By the default model, a pair over metal wished brighter than it can be, below two rough interfaces.
+
+    The search for all of the wish leads nowhere. Expected: most of the way, and the other lobes have stayed.
+    """
+    model = named("velatura")
+    metal = vt.Interface(eta=(2.158, 2.503, 1.997), k=(3.149, 3.834, 2.814), alpha=0.3462)
+    coats = [vt.Interface(eta=1.229, alpha=0.1246), vt.Interface(eta=1.369, alpha=0.27)]
+    tinted = [vt.Interface(eta=1.656, alpha=0.413), vt.Medium(sigma_a=(0.407, 0.0, 0.102)), metal]
+    stack = Stack([*coats, *tinted])
+    form = [{"energy": 0.1}, {"energy": 0.1}, {"energy": 0.1, "interfaces": 2, "base": "conductor"}]
+    now = seen(stack, Target(form), model)
+    found = answer(stack, now.with_energy(2, 3.57 * np.array(now.lobes[2].colour)), model, quick=True)
+    assert found.part > 0.7
+    for k in range(2):
+        assert found.reached.lobes[k].colour == pytest.approx(now.lobes[k].colour, rel=1e-3)

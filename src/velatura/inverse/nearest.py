@@ -29,7 +29,7 @@ ON_LINE, QUICKLY_ON_LINE = 1e-3, 2e-2  # what an answer may miss the line by
 SAME = 1e-5  # difference of roughnesses of a blur that stays
 CLOSE = 0.05  # part of the way from which a wish is met by itself
 UNLIKE = 1e-3  # energy or variance by which a stack differs from the nearest that can be dragged, and is taken itself
-HALVINGS = 6  # of the way that is left, where other searches are looked at
+HALVINGS = 6, 3  # of the way that is left, where other searches are looked at, at rest and under the hand
 DIMMED = 0.7  # share of the energy of a lobe that it has in any case if it is blurred more
 LEAST = 1e-3  # part of the way that is no change
 ROUNDED = 1e-3  # share of an energy by which a wish may be off, that is not worth a word
@@ -86,8 +86,8 @@ def nearest(present: DraggedStack, wish: Target, now: Target | None = None, quic
         found, bound, part = further[:3] if further[2] > part else (found, bound, part)
     if bound is not None and part < LEAST and present.space.slow and not quick:
         found, bound, part = _by_closed_form(present, now, possible) or (found, bound, part)
-    if bound is not None and not present.space.slow:
-        found, bound, part = _further(present, now, possible, found, bound, part)
+    if bound is not None and (not present.space.slow or not (settled or part >= LEAST)):
+        found, bound, part = _further(present, now, possible, found, bound, part, quick)
     if bound is not None and (dimmer := _dimmed(present, now, possible, bound, quick)) is not None:
         found, part = dimmer, 1.0
     if bound is None and not quick and _beside(found, possible) > EXACT:
@@ -156,19 +156,21 @@ def _along(
 
 
 def _further(
-    present: DraggedStack, now: Target, wish: Target, found: DraggedStack, bound: Bound, part: float
+    present: DraggedStack, now: Target, wish: Target, found: DraggedStack, bound: Bound, part: float, quick: bool
 ) -> tuple[DraggedStack, Bound, float]:
     """The stack that other searches find further on the line, by bisection, the bound there, and the part of the way.
 
-    The first search may have ended beside the line: its bound counts only where nothing is looked for from its end.
+    The first search may have ended beside the line: its bound counts only where nothing is looked for from its end. A
+    wish far beyond what is possible may lead a slow model astray, where a part of it does not.
     """
+    slow = present.space.slow
     here, goal = _readings(present, now, now), _readings(present, now, wish)
     end = 1.0
-    for _ in range(HALVINGS):
+    for _ in range(HALVINGS[quick and slow]):
         middle = (part + end) / 2
         asked = present.space.target_of(here + middle * (goal - here), wish)
-        stack, stopped, *_ = _along(found, found.now(asked), asked, False)
-        other = stack if stopped is None else _elsewhere(present, asked, False)
+        stack, stopped, *_ = _along(found, found.now(asked), asked, quick and slow)
+        other = stack if stopped is None else None if slow else _elsewhere(present, asked, False)
         if other is not None:
             found, part = other, middle
         elif stopped is not None:
