@@ -625,7 +625,7 @@ def test_the_truth_beside_the_model(visit: Open) -> None:
     page.page.locator("details.section > summary").last.click()
     page.page.get_by_label("Compare").select_option("split")
     alike = page.picture()
-    page.page.get_by_label("With").select_option("truth")
+    page.page.get_by_label("With", exact=True).select_option("truth")
     page.page.wait_for_function("() => velatura.viewport.truth?.samples >= 32", timeout=60_000)
     truth = page.picture()
     assert float(np.mean(np.abs(truth - alike)[:, :30])) < SAME

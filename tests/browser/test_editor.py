@@ -1217,7 +1217,7 @@ def test_everything_is_reached_by_keys_and_has_a_name(visit: Open) -> None:
     page = visit()
     page.page.wait_for_selector(".snapshot")
     reached = []
-    for _ in range(120):
+    for _ in range(140):
         page.page.keyboard.press("Tab")
         found = page.page.evaluate(
             """() => {

@@ -171,7 +171,7 @@ def test_a_file_of_the_folder_is_opened_with_its_image_and_one_is_mixed_in(visit
     said(page, "Mixed with Gilt")
 
     page.page.get_by_role("button", name="Open", exact=True).click()
-    page.page.get_by_role("searchbox").fill("coated-lens")
+    page.page.get_by_role("searchbox", name="Search").fill("coated-lens")
     page.page.keyboard.press("Enter")
     page.page.wait_for_function("(name) => velatura.store.get().name === name", arg=vt.preset("coated-lens").name)
     assert sorted(file.name for file in served.folder.iterdir()) == ["gilt.xml", "wood.png"]

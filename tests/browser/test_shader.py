@@ -164,7 +164,8 @@ def test_tables_are_read_as_the_manual_has_it(page: chromium.Browser, tmp_path: 
     found = page.page.evaluate(READ_TABLES, {"text": block, "bytes": [*(tmp_path / "gold.tables.bin").read_bytes()]})
     assert (found["asked"], found["error"]) == ("gold.tables.bin", 0)
     read = np.reshape(found["texels"], (found["height"], found["width"], 4))
-    np.testing.assert_array_equal(read, columns.astype(np.float32))
+    # A material that is solved anew is the same to rounding
+    np.testing.assert_allclose(read, columns, rtol=1e-6, atol=1e-15)
 
 
 STEEP = {"interface": {"eta": 1.5, "alpha": 0.15}}

@@ -1,4 +1,4 @@
-"""What the page sees, as Mitsuba's scene: an object of a material in an environment, from the page's camera."""
+"""The view of the page as Mitsuba's scene: an object of a material in an environment, from the page's camera."""
 
 from __future__ import annotations
 

@@ -136,9 +136,20 @@ class Hands:
     def material(self) -> dict[str, Any]:
         """The material of the page as a body has it."""
         state = self.visit.state()
-        whole = {"name": state["name"], "source": state["source"], "exterior": state["exterior"], "thin": state["thin"]}
-        on = [{layer["kind"]: layer["keys"]} for layer in state["layers"] if layer["enabled"]]
-        return {**{key: value for key, value in whole.items() if value}, "layers": on}
+
+        def written(node: dict[str, Any]) -> dict[str, Any]:
+            named = {key: node[key] for key in ("name", "source") if node[key]}
+            if node.get("parts"):
+                return {**named, "mix": [part(each) for each in node["parts"]]}
+            own = {**node, **{key: state[key] for key in ("thin", "layers")}} if node["id"] == state["part"] else node
+            on = [{layer["kind"]: layer["keys"]} for layer in own["layers"] if layer["enabled"]]
+            return {**named, "exterior": state["exterior"], "thin": own["thin"], "layers": on}
+
+        def part(node: dict[str, Any]) -> dict[str, Any]:
+            weight = {} if node["weight"] is None else {"weight": node["weight"]}
+            return {**weight, "material": written(node)}
+
+        return written({**state, "id": None})
 
     def _follows(self) -> None:
         """The picture has the material that the state has, or a message says why not."""

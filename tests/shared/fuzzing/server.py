@@ -34,6 +34,14 @@ TARGET: dict[str, Any] = {
 }
 MODEL = {"model": "velatura", "switches": {"reflectance": "fgd", "form": "forward"}}
 ABOUT = {"material": COAT, "target": TARGET, "lobe": 1, **MODEL}
+SHOT = {
+    "material": COAT,
+    "object": "sphere",
+    "environment": "studio",
+    "rotation": 20,
+    "camera": {"origin": [0, 1, 5], "target": [0, 0, 0], "fov": 30},
+    "size": [16, 12],
+}
 
 #: A body of each verb that is answered, from which others are made.
 BODIES: dict[str, dict[str, Any]] = {
@@ -56,16 +64,11 @@ BODIES: dict[str, dict[str, Any]] = {
     "class": {**ABOUT, "size": 16},
     "member": {**ABOUT, "point": [1.5, 3.0, 0.5], "map": "conductor"},
     "coat": {"material": COAT, "eta": 1.5, "alpha": 0.1, "keep": True, **MODEL},
-    "truth": {
-        "material": COAT,
-        "object": "sphere",
-        "environment": "studio",
-        "rotation": 20,
-        "camera": {"origin": [0, 1, 5], "target": [0, 0, 0], "fov": 30},
-        "size": [16, 12],
-        "spp": 1,
-        "seed": 1,
-    },
+    "truth": {**SHOT, "spp": 1, "seed": 1},
+    "render": {**SHOT, **MODEL, "samples": 1, "key": "a", "step": 0, "file": "picture.png", "transparent": True},
+    "rename": {"file": "coat.yaml", "name": "coat.yml"},
+    "remove": {"file": "coat.yaml"},
+    "restore": {"file": "coat.yaml", "name": "again.yaml"},
     "validation": {"name": "reflection", "parameters": {"alpha_1": 0.2, "angle": 30}},
 }
 

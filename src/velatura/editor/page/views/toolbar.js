@@ -61,7 +61,6 @@ function toolbar(bar) {
       <span class="document" title=${changed ? 'There are changes that are not saved' : ''}>
         ${file ?? (changed ? 'Not saved' : nothing)}${file && changed ? ' · unsaved changes' : nothing}
       </span>
-      <span class="rest"></span>
       <button type="button" @click=${bar.exports.show} title="For other programs">Export</button>
       <button type="button" ?disabled=${bar.lacks('render')} @click=${bar.rendering.show} title=${bar.lacks('render') || 'By Mitsuba, into the folder'}>
         ${bar.rendering.title}

@@ -61,8 +61,8 @@ def straight_share(material: Material) -> float:
 
 
 def _faces(material: Material) -> tuple[tuple[float, float], tuple[float, float], float, float]:
-    """Of the roughest interface, and at most of another one, how much they turn light, and the step of the logarithm of
-    the index; from 0 to 1, how alike all are along both axes, and whether the index below is that above."""
+    """How much the roughest interface, and at most another one, turn light, and the steps of the logarithm of their
+    indices; from 0 to 1, how alike all are along both axes, and whether the index below is that above."""
     outside = float(ops.mean(np.ravel(material.exterior)))
     n, found, round_ = outside, [(0.0, 0.0)] * 2, 1.0
     for layer in material.solid().layers:
