@@ -153,6 +153,8 @@ def test_textures_are_sent_and_nothing_else(here: Path, port: int) -> None:
         "..%2fstatic%2feditor.js",
         "%2e%2e/static/index.html",
         "none.png",
+        "%00.png",
+        "a" * 3000 + "/b.png",
     ):
         assert ask(port, "GET", f"/files/{path}")[0] == 404
 

@@ -61,7 +61,10 @@ def hold(data: bytes, name: str, ending: str) -> Path:
 
 def is_of_presets(path: str | Path) -> bool:
     """Whether a file lies beside the presets of the package."""
-    return Path(os.path.realpath(path)).parent == _PRESETS
+    try:
+        return Path(os.path.realpath(path)).parent == _PRESETS
+    except ValueError:  # no path at all, as with a null byte
+        return False
 
 
 def held(material: Record, presets: bool = False) -> list[str]:
