@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Generator, Iterator
+from collections.abc import Callable, Generator, Iterator
 from typing import Any
 
 import pytest
-from editor import Server, Visit, browser, server
+from editor import Server, Tabs, Visit, browser, server, unexpected
 
 
 @pytest.fixture(scope="module")
@@ -19,6 +19,20 @@ def opened() -> Iterator[Any]:
 def served(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Server]:
     with server(tmp_path_factory.mktemp("materials")) as running:
         yield running
+
+
+@pytest.fixture(scope="module")
+def tabs(opened: Any) -> Tabs:
+    return Tabs(opened)
+
+
+@pytest.fixture
+def visit(tabs: Tabs, served: Server) -> Iterator[Callable[..., Visit]]:
+    """Opens the page, with the preset coated-gold, in a browser without a past, whose console may not complain."""
+    yield lambda: tabs.visit(served.entrance)
+    assert unexpected(tabs.forget(), []) == []
+    for file in served.folder.iterdir():
+        file.unlink()
 
 
 @pytest.hookimpl(wrapper=True)

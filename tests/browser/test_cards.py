@@ -6,7 +6,6 @@ Rationale: what a card shows depends on the page's own state, which no file has,
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from typing import Any
 
 import chromium
 import pytest
@@ -16,11 +15,6 @@ pytestmark = pytest.mark.skipif(bool(chromium.missing()), reason=chromium.missin
 
 Open = Callable[..., Visit]
 PLAIN = "localStorage['velatura.layout'] ??= '{}'"  # as a browser without a past has the page
-
-
-@pytest.fixture(scope="module")
-def tabs(opened: Any) -> Tabs:
-    return Tabs(opened)
 
 
 @pytest.fixture

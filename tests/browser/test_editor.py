@@ -37,11 +37,6 @@ AXE = Path(__file__).parents[1] / "page/node_modules/axe-core/axe.min.js"
 PREVIEWS = "[...velatura.viewport.device.programs.keys()].filter((text) => text.includes('PARTS =')).length"
 
 
-@pytest.fixture(scope="module")
-def tabs(opened: Any) -> Tabs:
-    return Tabs(opened)
-
-
 @pytest.fixture
 def visit(opened: Any, tabs: Tabs, served: Server) -> Iterator[Open]:
     """Opens pages in a browser without a past, and sees that no console complains; the folder is empty afterwards."""

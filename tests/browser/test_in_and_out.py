@@ -61,11 +61,6 @@ def mtlx(*materials: str) -> str:
     return f'<?xml version="1.0"?>\n<materialx version="1.39" colorspace="lin_rec709">\n{body}\n</materialx>'
 
 
-@pytest.fixture(scope="module")
-def tabs(opened: Any) -> Tabs:
-    return Tabs(opened)
-
-
 @pytest.fixture
 def visit(tabs: Tabs, served: Server) -> Iterator[Open]:
     """Opens the page in a browser without a past; no console may complain of more than what is expected."""

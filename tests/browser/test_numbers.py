@@ -5,28 +5,16 @@ Rationale: pointers, wheels and double clicks exist in a browser alone, and one 
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from typing import Any
 
 import chromium
 import pytest
-from editor import Server, Tabs, Visit, unexpected
+from editor import Visit
 
 pytestmark = pytest.mark.skipif(bool(chromium.missing()), reason=chromium.missing())
 
 Open = Callable[..., Visit]
-
-
-@pytest.fixture(scope="module")
-def tabs(opened: Any) -> Tabs:
-    return Tabs(opened)
-
-
-@pytest.fixture
-def visit(tabs: Tabs, served: Server) -> Iterator[Open]:
-    """Opens the page, with the preset coated-gold, in a browser without a past, whose console may not complain."""
-    yield lambda: tabs.visit(served.entrance)
-    assert unexpected(tabs.forget(), []) == []
 
 
 def scrub(page: Visit, label: Any, pixels: int, key: str = "") -> None:

@@ -5,34 +5,19 @@ Rationale: a dialog, the server's steps and the folder work together, and the pa
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from pathlib import Path
-from typing import Any
 
 import chromium
 import numpy as np
 import pytest
-from editor import Server, Tabs, Visit, unexpected
+from editor import Server, Visit
 
 from velatura import kernel
 
 pytestmark = pytest.mark.skipif(bool(chromium.missing()), reason=chromium.missing())
 
 Open = Callable[..., Visit]
-
-
-@pytest.fixture(scope="module")
-def tabs(opened: Any) -> Tabs:
-    return Tabs(opened)
-
-
-@pytest.fixture
-def visit(tabs: Tabs, served: Server) -> Iterator[Open]:
-    """Opens the page, with the preset coated-gold, in a browser without a past, whose console may not complain."""
-    yield lambda: tabs.visit(served.entrance)
-    assert unexpected(tabs.forget(), []) == []
-    for file in served.folder.iterdir():
-        file.unlink()
 
 
 def typed(page: Visit, label: str, value: int) -> None:

@@ -19,11 +19,6 @@ pytestmark = pytest.mark.skipif(bool(chromium.missing()), reason=chromium.missin
 MOST = 8  # acts of a task, with New
 
 
-@pytest.fixture(scope="module")
-def tabs(opened: Any) -> Tabs:
-    return Tabs(opened)
-
-
 @pytest.fixture
 def page(tabs: Tabs, served: Server) -> Iterator[Visit]:
     """The page of a browser without a past, whose console may not complain."""
