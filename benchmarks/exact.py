@@ -1,8 +1,8 @@
 """The form `exact` beside the walk and the model: equal light, noise, and cost, over stacks of the benchmark.
 
 Agreement: light of samples in 24 cells of directions, against that of walks, by z-tests at .01 for all cells of all
-stacks together (Sidak); and all light, with 1 % more, as far as samples tell that from chance. Pictures: spheres in the
-studio by path tracing, rounds interleaved; noise is the standard deviation of a pixel over rounds (root mean square,
+stacks together (Sidak); and all light, with 1 % more, as far as samples distinguish that from chance. Pictures:
+spheres in the studio by path tracing, rounds interleaved; noise is the standard deviation of a pixel over rounds (root mean square,
 and median over pixels), cost is processor time, and error at equal time is noise times the root of time: of the model
 noise alone, as the least that estimates of walks can reach.
 
@@ -81,7 +81,7 @@ def bound(count: int) -> float:
 
 
 def agreement(mi: Any, cases: Iterable[Case], count: int) -> None:
-    found, told, tried = [], 0, 0
+    found, distinguished, tried = [], 0, 0
     for case in cases:
         plugins = bsdfs(case.stack, case.often)
         exact, walk = (mi.load_dict(plugins[name]) for name in ("exact", "walk"))
@@ -90,7 +90,7 @@ def agreement(mi: Any, cases: Iterable[Case], count: int) -> None:
             z = deviations(cells(*a), cells(*b))
             means, errors = ([f(w[0]) for _, w in (a, b)] for f in (np.mean, lambda w: np.std(w) / np.sqrt(count)))
             error = np.hypot(*errors)
-            told += error < 0.01 * means[0] / (2 * FOUND)
+            distinguished += error < 0.01 * means[0] / (2 * FOUND)
             tried += 1
             found.append(z)
             if len(z):
@@ -102,7 +102,13 @@ def agreement(mi: Any, cases: Iterable[Case], count: int) -> None:
     z = np.abs(np.concatenate(found))
     row("agreement", "worst cell", float(z.max()), "standard errors", f"bound {bound(len(z)):.2f} for {len(z)} cells")
     row("agreement", "cells beyond two standard errors", float(np.mean(z > 2)), "", "0.046 by chance")
-    row("agreement", "a bias of 1 % is found", told / tried, "of the directions", f"at {FOUND:g} standard errors")
+    row(
+        "agreement",
+        "a bias of 1 % is found",
+        distinguished / tried,
+        "of the directions",
+        f"at {FOUND:g} standard errors",
+    )
 
 
 def pictures(mi: Any, cases: Iterable[Case], spp: int, rounds: int, size: int) -> None:

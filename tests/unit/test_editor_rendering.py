@@ -7,22 +7,14 @@ from typing import Any
 
 import numpy as np
 import pytest
+from shots import MIRROR
 
 from velatura import kernel, scenes
 from velatura.editor import rendering
 from velatura.editor.folder import Folder
 from velatura.errors import InvalidInput
 
-VIEW = scenes.OBJECTS["sphere"].view
-BODY: dict[str, Any] = {
-    "material": {"layers": [{"interface": {"conductor": "mirror"}}]},
-    "object": "sphere",
-    "environment": "studio",
-    "camera": {"origin": list(VIEW.origin), "target": list(VIEW.target), "fov": VIEW.fov},
-    "size": [24, 16],
-    "samples": 40,
-    "file": "ball.exr",
-}
+BODY = {**MIRROR, "samples": 40, "file": "ball.exr"}
 
 
 @pytest.fixture

@@ -7,20 +7,12 @@ from typing import Any
 
 import numpy as np
 import pytest
+from shots import MIRROR
 
 from velatura.editor.service import VERBS
 from velatura.errors import InvalidInput
-from velatura.scenes import OBJECTS
 
-VIEW = OBJECTS["sphere"].view
-BODY: dict[str, Any] = {
-    "material": {"layers": [{"interface": {"conductor": "mirror"}}]},
-    "object": "sphere",
-    "environment": "studio",
-    "camera": {"origin": list(VIEW.origin), "target": list(VIEW.target), "fov": VIEW.fov},
-    "size": [24, 16],
-    "spp": 16,
-}
+BODY = {**MIRROR, "spp": 16}
 
 
 def picture(**changes: Any) -> np.ndarray:

@@ -163,14 +163,15 @@ def _further(
     The first search may have ended beside the line: its bound counts only where nothing is looked for from its end. A
     wish far beyond what is possible may lead a slow model astray, where a part of it does not.
     """
-    slow = present.space.slow
     here, goal = _readings(present, now, now), _readings(present, now, wish)
     end = 1.0
-    for _ in range(HALVINGS[quick and slow]):
+    for _ in range(HALVINGS[quick]):
         middle = (part + end) / 2
         asked = present.space.target_of(here + middle * (goal - here), wish)
-        stack, stopped, *_ = _along(found, found.now(asked), asked, quick and slow)
-        other = stack if stopped is None else None if slow else _elsewhere(present, asked, False)
+        stack, stopped, *_ = _along(found, found.now(asked), asked, quick)
+        other = stack if stopped is None else None
+        if stopped is not None and not present.space.slow:
+            other = _elsewhere(present, asked, False)
         if other is not None:
             found, part = other, middle
         elif stopped is not None:

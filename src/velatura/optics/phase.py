@@ -184,15 +184,17 @@ def sample_henyey_greenstein(g: Value, u: Value) -> Value:
     return (s + 0.5 * g * (3 + s * s) + g * g * s - 0.5 * g * g * g * (1 - s * s)) / (d * d)
 
 
-def deflect(w: Direction, cos_theta: Value, phi: Value) -> Direction:
-    """The direction of travel `w` turned by the angle of cosine `cos_theta`, at azimuth `phi` about it."""
-    # Build two directions across w (Duff et al. 2017)
+def tangents(w: Direction) -> tuple[Direction, Direction]:
+    """Two directions across `w`, which vary smoothly on either side of the surface (Duff et al. 2017)."""
     sign = ops.select(w[2] < 0, -1.0, 1.0)
     a = -1 / (sign + w[2])
     b = w[0] * w[1] * a
-    s = (1 + sign * w[0] * w[0] * a, sign * b, -sign * w[0])
-    t = (b, sign + w[1] * w[1] * a, -w[1])
-    # Turn
+    return (1 + sign * w[0] * w[0] * a, sign * b, -sign * w[0]), (b, sign + w[1] * w[1] * a, -w[1])
+
+
+def deflect(w: Direction, cos_theta: Value, phi: Value) -> Direction:
+    """The direction of travel `w` turned by the angle of cosine `cos_theta`, at azimuth `phi` about it."""
+    s, t = tangents(w)
     sin_theta = ops.sqrt(1 - cos_theta * cos_theta)
     x, y = sin_theta * ops.cos(phi), sin_theta * ops.sin(phi)
     return (

@@ -1,8 +1,8 @@
 """The light of a material by prefiltered environments: for light from each direction, every part's energy, the mean
 direction in which it leaves, and its width.
 
-An engine blurs its environment by a GGX lobe seen along the normal (Karis 2013), of roughness alpha: `kernel`. A part
-of the model is then that blur about its own mean direction. It takes the alpha by which the blur is as wide as the part
+An engine blurs its environment by a GGX lobe seen along the normal (Karis 2013), of roughness alpha
+(`kernel_variance`). A part of the model is then that blur about its own mean direction. It takes the alpha by which the blur is as wide as the part
 is across its axis of least width; along the other axis several blurs lie side by side. Widths are second moments on the
 sphere, which are finite for GGX.
 """
@@ -22,6 +22,7 @@ from velatura.model.context import Context
 from velatura.model.guards import ALPHA_MIN
 from velatura.model.variance import Isotropic
 from velatura.optics.ggx import Direction
+from velatura.optics.phase import tangents
 from velatura.renderer import directional_grid
 from velatura.renderer.low_discrepancy import at_nodes, repeated
 from velatura.stack import Material
@@ -63,12 +64,11 @@ def kernel_variance(alpha: float) -> float:
     # In powers of the sine of half the angle, so that narrow blurs have nodes
     s = np.geomspace(1e-9, 0.5, 4000)
     z = 1 - 2 * s
-    weight = z / (2 * alpha**2 + (1 - alpha**2) * 2 * s) ** 2 if alpha else np.zeros_like(s)
-    total = np.trapezoid(weight, s)
-    return float(0.5 * np.trapezoid(weight * (1 - z * z), s) / total) if alpha else 0.0
+    weight = z / (2 * alpha**2 + (1 - alpha**2) * 2 * s) ** 2
+    return float(0.5 * np.trapezoid(weight * (1 - z * z), s) / np.trapezoid(weight, s))
 
 
-VARIANCES = np.array([kernel_variance(alpha) for alpha in ALPHAS])
+VARIANCES = np.array([0.0, *map(kernel_variance, ALPHAS[1:])])
 
 
 def prefiltered(material: Material, model: Model) -> Prefiltered:
@@ -116,22 +116,13 @@ def _moments(body: Body, wi: Direction, asked: Query) -> Array:
     mean = np.where(length > 1e-6, mean / np.maximum(length, 1e-6), upwards)
 
     # Variances about it
-    along = [np.einsum("an,ans->ns", t, w) for t in tangents(mean)]
+    along = [np.einsum("an,ans->ns", np.stack(t), w) for t in tangents((mean[0], mean[1], mean[2]))]
     xx, xy, yy = ((along[a] * along[b] * share).sum(axis=-1) for a, b in ((0, 0), (0, 1), (1, 1)))
     half, cross = 0.5 * (xx - yy), xy
     radius = np.hypot(half, cross)
     least = np.maximum(0.5 * (xx + yy) - radius, 0)
     alpha = np.interp(least, VARIANCES, ALPHAS)
     return np.stack([*energy, mean[0] / sine, mean[1] / sine, np.sqrt(alpha), 2 * half, 2 * cross], axis=-1)
-
-
-def tangents(w: Array) -> tuple[Array, Array]:
-    """Axes about directions (3, ...), which vary smoothly on either side of the surface (Duff et al. 2017)."""
-    x, y, z = w
-    side = np.where(z < 0, -1.0, 1.0)
-    a = -1 / (side + z)
-    b = x * y * a
-    return np.stack([1 + side * x * x * a, side * b, -side * x]), np.stack([b, side + y * y * a, -y])
 
 
 def texture(found: Prefiltered) -> Array:

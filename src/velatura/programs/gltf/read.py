@@ -52,7 +52,7 @@ def read(values: Mapping[str, Any], name: str = "", notes: Notes | None = None) 
     metal = given.share("metallicFactor")
     shares = Shares(
         cover=given.share("alpha"),
-        coat=given.share("coatFactor" if coat_of(values) else "clearcoatFactor"),
+        coat=given.share("coatFactor" if has_coat(values) else "clearcoatFactor"),
         film=given.share("iridescenceFactor"),
         metal=metal,
         clear=given.share("transmissionFactor") if metal != 1 else 0.0,
@@ -60,11 +60,11 @@ def read(values: Mapping[str, Any], name: str = "", notes: Notes | None = None) 
     given.leave("sheenColorFactor", parts.FIBRES)
     given.leave("emissiveFactor", parts.LIGHT)
     given.leave("diffuseTransmissionFactor", parts.OPAQUE)
-    coat = _coat if coat_of(values) else _clearcoat
+    coat = _coat if has_coat(values) else _clearcoat
     return imported(lambda part: _surface(given, part, coat), shares, notes, name, "imported from glTF")
 
 
-def coat_of(values: Mapping[str, Any]) -> bool:
+def has_coat(values: Mapping[str, Any]) -> bool:
     """Whether a material has the coat that takes the place of a clearcoat."""
     return any(name.startswith("coat") for name in values)
 

@@ -1,4 +1,4 @@
-// What of the page is open, and the sizes in pixels that hands have given; a browser remembers it.
+// The parts of the page that are open, and the sizes in pixels that hands have given; a browser remembers it.
 
 const LAYOUT = { history: true, look: false, view: false, model: false, expert: false, lookHeight: null, panelWidth: null };
 
