@@ -2,9 +2,9 @@
 
 Agreement: light of samples in 24 cells of directions, against that of walks, by z-tests at .01 for all cells of all
 stacks together (Sidak); and all light, with 1 % more, as far as samples distinguish that from chance. Pictures:
-spheres in the studio by path tracing, rounds interleaved; noise is the standard deviation of a pixel over rounds (root mean square,
-and median over pixels), cost is processor time, and error at equal time is noise times the root of time: of the model
-noise alone, as the least that estimates of walks can reach.
+spheres in the studio by path tracing, rounds interleaved; noise is the standard deviation of a pixel over rounds (root
+mean square, and median over pixels), cost is processor time, and error at equal time is noise times the root of time:
+of the model noise alone, as the least that estimates of walks can reach.
 
     python benchmarks/exact.py [--of-each 1] [--kinds "two interfaces" ...] [--count 262144] [--spp 16] [--rounds 6]
         [--size 96] [--parts agreement pictures]

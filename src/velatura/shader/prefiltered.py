@@ -2,9 +2,9 @@
 direction in which it leaves, and its width.
 
 An engine blurs its environment by a GGX lobe seen along the normal (Karis 2013), of roughness alpha
-(`kernel_variance`). A part of the model is then that blur about its own mean direction. It takes the alpha by which the blur is as wide as the part
-is across its axis of least width; along the other axis several blurs lie side by side. Widths are second moments on the
-sphere, which are finite for GGX.
+(`kernel_variance`). A part of the model is then that blur about its own mean direction. It takes the alpha by which the
+blur is as wide as the part is across its axis of least width; along the other axis several blurs lie side by side.
+Widths are second moments on the sphere, which are finite for GGX.
 """
 
 from __future__ import annotations
