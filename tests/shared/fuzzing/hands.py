@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import base64
+import hashlib
 import random
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -15,6 +16,7 @@ import velatura as vt
 from velatura.editor import service
 from velatura.editor.messages import to_write
 from velatura.errors import InvalidInput
+from velatura.stack.paths import rewritten
 
 MOST_LAYERS = 7  # from which on no more are added
 REFUSED = "the server responded with a status of 4"  # what the browser notes of a stack that is refused in words
@@ -134,7 +136,7 @@ class Hands:
     # What must hold
 
     def material(self) -> dict[str, Any]:
-        """The material of the page as a body has it."""
+        """The material of the page as a body has it, with paths of images from anywhere."""
         state = self.visit.state()
 
         def written(node: dict[str, Any]) -> dict[str, Any]:
@@ -149,7 +151,8 @@ class Hands:
             weight = {} if node["weight"] is None else {"weight": node["weight"]}
             return {**weight, "material": written(node)}
 
-        return written({**state, "id": None})
+        found: dict[str, Any] = rewritten(written({**state, "id": None}), lambda path: str(self.folder / path))
+        return found
 
     def _follows(self) -> None:
         """The picture has the material that the state has, or a message says why not."""
@@ -189,7 +192,7 @@ class Hands:
         self.visit.settled()
 
     def _saves(self) -> None:
-        """A saved file holds the material."""
+        """A saved file holds the material, and its images lie beside it."""
         name = f"saved-{len(self.outcome.heaps)}.yaml"
         try:
             stack = to_write({"material": self.material()})
@@ -199,7 +202,8 @@ class Hands:
         self.page.get_by_label("File name").fill(name)
         self.page.locator("dialog.save").get_by_role("button", name="Save").click()
         self.page.get_by_text(f"Saved {name}").wait_for()
-        if vt.load(self.folder / name).to_dict() != stack.to_dict():
+        there, here = (rewritten(each.to_dict(), digest) for each in (vt.load(self.folder / name), stack))
+        if there != here:
             self._fail("a saved file", [name])
 
     def _fail(self, what: str, details: list[str]) -> None:
@@ -207,6 +211,11 @@ class Hands:
         self.outcome.failures += [
             f"{what}: {detail} (after {len(self.outcome.edits)} edits: {last})" for detail in details
         ]
+
+
+def digest(path: str) -> str:
+    """Digest of an image, by which it is compared, since images of presets are saved beside a file."""
+    return hashlib.sha256(Path(path).read_bytes()).hexdigest()
 
 
 def alike(value: Any, wanted: Any) -> bool:
