@@ -1,4 +1,4 @@
-"""The tutorial notebook: it runs, prints the numbers that it was stored with, and is fit to be shipped."""
+"""The tutorial notebooks: they run, print the numbers that they were stored with, and are fit to be shipped."""
 
 from __future__ import annotations
 
@@ -15,27 +15,32 @@ import velatura
 LACKS = [name for name in ("nbformat", "nbclient", "anywidget") if not find_spec(name)]
 pytestmark = pytest.mark.skipif(bool(LACKS), reason=f"missing: {LACKS}")
 
-NOTEBOOK = Path(__file__).parents[2] / "docs" / "tutorials" / "inverse-design.ipynb"
-LARGEST = 600_000  # bytes
+NOTEBOOKS = sorted((Path(__file__).parents[2] / "docs" / "tutorials").glob("*.ipynb"))
+LARGEST = 700_000  # bytes
+
+each = pytest.mark.parametrize("notebook", NOTEBOOKS, ids=[path.stem for path in NOTEBOOKS])
 
 
-def stored() -> Any:
+def stored(notebook: Path) -> Any:
     import nbformat
 
-    return nbformat.read(NOTEBOOK, as_version=4)
+    return nbformat.read(notebook, as_version=4)
 
 
 def printed(cell: Any) -> str:
     return "".join(output.text for output in cell.get("outputs", []) if output.output_type == "stream")
 
 
-def test_the_notebook_runs_and_prints_what_it_has_stored(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+@each
+def test_a_notebook_runs_and_prints_what_it_has_stored(
+    notebook: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     """What is printed is rounded so that it is the same everywhere; of pictures it counts that there are any."""
     import nbclient
 
     monkeypatch.setenv("PYTHONPATH", str(Path(velatura.__file__).parents[1]))
     monkeypatch.setenv("IPYTHONDIR", str(tmp_path / "ipython"))
-    expected, run = stored(), stored()
+    expected, run = stored(notebook), stored(notebook)
     nbclient.NotebookClient(run, timeout=300, resources={"metadata": {"path": str(tmp_path)}}).execute()
     for cell, before in zip(run.cells, expected.cells):
         assert printed(cell) == printed(before)
@@ -43,9 +48,10 @@ def test_the_notebook_runs_and_prints_what_it_has_stored(tmp_path: Path, monkeyp
         assert kinds == kinds_before
 
 
-def test_the_notebook_is_small_and_names_no_place() -> None:
-    text = NOTEBOOK.read_text(encoding="utf-8")
+@each
+def test_a_notebook_is_small_and_names_no_place(notebook: Path) -> None:
+    text = notebook.read_text(encoding="utf-8")
     assert len(text) < LARGEST
     assert not re.search(r"/(home|root|tmp|work|usr|Users)/|site-packages| at 0x[0-9a-f]+", text)
-    assert all(cell.get("outputs") is not None for cell in stored().cells if cell.cell_type == "code")
-    assert "widgets" not in stored().metadata
+    assert all(cell.get("outputs") is not None for cell in stored(notebook).cells if cell.cell_type == "code")
+    assert "widgets" not in stored(notebook).metadata
