@@ -229,10 +229,11 @@ class _DrJit(Unrolled):
 
         around, found = corners(table.shape, [number(x) for x in coordinates], split), []
         packets, first = table.packets(dialect), table.first
+        several = dialect.ArrayXf64 if number is dialect.Float64 else dialect.ArrayXf
         if not isinstance(first, int) or first:
             around = [(node + dialect.UInt32(first), weight) for node, weight in around]
         for begin, width in packets.parts:
-            kind, shape = (number, None) if width == 1 else (dialect.ArrayXf, (width, 1))
+            kind, shape = (number, None) if width == 1 else (several, (width, 1))
             total: Value = 0.0
             for node, weight in around:
                 index = node * (packets.stride // width) + begin // width

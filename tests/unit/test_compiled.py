@@ -8,10 +8,17 @@ import pytest
 
 import velatura as vt
 from velatura import ops
+from velatura.model import named
+from velatura.model.context import Context
 from velatura.model.rough_interface import KEPT
+from velatura.model.solved import reciprocal_balance
+from velatura.model.solved.solve import solve
+from velatura.model.variance import variance_kind
 from velatura.renderer import compiled
-from velatura.renderer.compiled import Deposit, Found
+from velatura.renderer.compiled import Colour, Deposit, Found
+from velatura.renderer.directional_grid import Curves
 from velatura.renderer.kept import Kept
+from velatura.stack import Interface, Material, Stack
 
 
 @dataclass(frozen=True)
@@ -60,6 +67,25 @@ def test_kernels_and_numpy_agree(monkeypatch: pytest.MonkeyPatch) -> None:
     product = sources[0][:, None] * SAMPLES[0]
     assert largest[0] == pytest.approx((0.7 * np.cos(product) + 0.25).max(axis=1), abs=1e-15)
     assert sums[2] == pytest.approx(0.9 * product.sum(axis=1), abs=1e-14)
+
+
+def read(sources: Any, samples: Any, numbers: Any) -> Found:
+    (x, t), (u,), (table, colour) = sources, samples, numbers
+    first, second, third, last = table((x * u, t * u, u * u))
+    return Found([colour(first, second, third)], [last])
+
+
+def test_kernels_read_tables(monkeypatch: pytest.MonkeyPatch) -> None:
+    shape = 5, 4
+    table = Curves(np.random.default_rng(3).random((*shape, 4)), shape)
+    given = table, Colour(np.ones((3, 1, 1)))
+    sources = [np.linspace(0.1, 1.0, 7), np.linspace(0.9, 0.0, 7)]
+    sums, largest, _ = compiled.over(read, sources, SAMPLES, given)
+    by_kernels(monkeypatch)
+    for kernel, plain in zip(compiled.over(read, sources, SAMPLES, given), (sums, largest)):
+        assert kernel == pytest.approx(plain, abs=1e-12)
+    # Samples of the last source lie along the first azimuth, at the nodes
+    assert largest[0, -1] == pytest.approx(table.data[:, 0, 3].max(), abs=1e-12)
 
 
 def test_light_falls_on_its_rows() -> None:
@@ -113,6 +139,26 @@ def test_lobes_are_the_same_by_numpy_and_by_kernels(monkeypatch: pytest.MonkeyPa
     for (energy, alpha), (compiled_energy, compiled_alpha) in zip(*found):
         assert np.array(compiled_energy) == pytest.approx(np.array(energy), abs=1e-12)
         assert np.array(compiled_alpha) == pytest.approx(np.array(alpha), abs=1e-9)
+
+
+def test_the_symmetric_form_is_the_same_by_numpy_and_by_kernels(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Where next to nothing is reflected, roots have the error of rounding beside it: 1e-8."""
+    glass = Stack([Interface(eta=1.5, alpha=0.2)])
+    brushed = Stack([Interface(eta=1.5, alpha=0.1), Interface(alpha=(0.1, 0.3), eta=0.2, k=3.0)])
+    monkeypatch.setattr(reciprocal_balance, "SAMPLES", {0: 64})
+    found = []
+    for kernels in (False, True):
+        if kernels:
+            by_kernels(monkeypatch)
+        else:
+            monkeypatch.setattr(compiled, "LEAST", 1 << 60)
+        for stack in (glass, brushed):
+            material = Material.of(stack).solid()
+            body = solve(material, named("velatura", form="symmetric"), variance_kind(material), Context())
+            x, y, z = np.array([-0.6, 0.0, -0.4]), np.array([0.0, 0.6, 0.0]), np.array([0.8, 0.8, -0.9])
+            found.append(np.array([*body.eval_pdf((0 * x + 0.6, 0 * x, 0 * x + 0.8), (x, y, z))[0]]))
+    for plain, kernel in zip(found[:2], found[2:]):
+        assert np.any(plain > 0.1) and kernel == pytest.approx(plain, abs=1e-7)
 
 
 def test_what_was_asked_for_last_is_kept_up_to_a_size() -> None:

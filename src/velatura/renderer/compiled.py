@@ -13,7 +13,7 @@ import functools
 import itertools
 from collections import Counter, OrderedDict
 from collections.abc import Callable, Hashable, Sequence
-from dataclasses import dataclass, fields, is_dataclass
+from dataclasses import dataclass, fields, is_dataclass, replace
 from threading import Lock
 from types import MethodType
 from typing import Any, NamedTuple
@@ -24,7 +24,8 @@ from scipy.sparse import csc_array
 
 from velatura import kernel
 from velatura.ops import Value
-from velatura.renderer.packets import WIDTH, aligned
+from velatura.renderer.directional_grid import Curves
+from velatura.renderer.packets import WIDTH, Packets, aligned, packets
 
 Array = NDArray[Any]
 
@@ -60,11 +61,23 @@ class Found(NamedTuple):
     deposits: Sequence[Deposit] = ()
 
 
+@dataclass(frozen=True)
+class Colour:
+    """Makes a colour of its channels, in NumPy or in a kernel: of the kind of `white`, a colour of ones."""
+
+    white: Value
+
+    def __call__(self, *channels: Value) -> Value:
+        if isinstance(self.white, np.ndarray):
+            return np.stack(channels)
+        return channels[0] if len(channels) == 1 else type(self.white)(*channels)
+
+
 class Varying(tuple[Value, ...]):
     """Numbers none of which belongs to the kind of a function, 0.0 and 1.0 included."""
 
 
-#: Of sources, samples and numbers
+#: Of sources, samples and numbers; in kernels a choice between two constants is one of single precision
 Function = Callable[[Sequence[Value], Sequence[Value], Any], Found]
 
 
@@ -79,18 +92,18 @@ def over(
     """Results of a function for each source (S,) over all samples (N,), or its own (S, N): sums (L, S), the largest
     (G, S), and of each light what falls on `rows`, and on the one beyond: (values, waves, rows + 1, S).
 
-    `numbers` are a list, a tuple or a record: of others, of numbers, and of colours (3, 1, ...). What is no number, and
-    0.0 and 1.0 but for those that are `Varying`, belong to the kind of function, as does all else that it depends on,
-    `kind`. It runs by NumPy alone if other objects are among them.
+    `numbers` are a list, a tuple or a record: of others, of numbers, of colours (3, 1, ...), and of `Curves` of NumPy.
+    What is no number, and 0.0 and 1.0 but for those that are `Varying`, belong to the kind of function, as does all
+    else that it depends on, `kind`. It runs by NumPy alone if other objects are among them.
     """
     count, width = samples[0].shape[-1], len(sources[0])
     if width * count > LEAST:
         with contextlib.suppress(_Foreign):
-            flat: list[float] = []
-            kind = function.__module__, function.__qualname__, kind, *(x.ndim for x in samples), _kind(numbers, flat)
+            read = _Read([], [])
+            kind = function.__module__, function.__qualname__, kind, *(x.ndim for x in samples), _kind(numbers, read)
             kernels = kernel.llvm() if _asked[kind] >= (MANY_DEPOSITED if rows else MANY) else None
             if kernels:
-                return _compiled(kernels, kind, function, sources, samples, numbers, flat, rows)
+                return _compiled(kernels, kind, function, sources, samples, numbers, read, rows)
             _asked[kind] += width * count
     size = max(BLOCK // count, 1)
     found = []
@@ -129,7 +142,7 @@ def _deposited(light: Deposit, shape: tuple[int, int], rows: int) -> Array:
     """Light that falls on rows, samples being columns of a sparse matrix."""
     shares, values, waves = (
         np.stack(np.broadcast_arrays(*each, np.empty(shape))[:-1], axis=-1)
-        for each in (light.shares, light.values, light.waves)
+        for each in (light.shares, _channels(light.values), light.waves)
     )
     first, source = np.asarray(light.first).astype(np.int32), np.arange(shape[0], dtype=np.int32)[:, None]
     steps = np.int32(shape[0]) * np.arange(shares.shape[-1], dtype=np.int32)
@@ -139,6 +152,13 @@ def _deposited(light: Deposit, shape: tuple[int, int], rows: int) -> Array:
     each = (values[..., :, None] * waves[..., None, :]).reshape(shape[0] * shape[1], values.shape[-1] * waves.shape[-1])
     found = csc_array(entries, ((rows + 1) * shape[0], len(each))) @ each
     return found.T.reshape(values.shape[-1], waves.shape[-1], rows + 1, shape[0])
+
+
+class _Read(NamedTuple):
+    """All that a kernel reads of the numbers of a function: numbers, those of colours one by one, and tables."""
+
+    flat: list[float]
+    tables: list[Curves]
 
 
 @dataclass(frozen=True)
@@ -156,7 +176,7 @@ def _compiled(
     sources: Sequence[Array],
     samples: Sequence[Array],
     numbers: Any,
-    flat: Sequence[float],
+    read: _Read,
     rows: int,
 ) -> tuple[Array, Array, list[Array]]:
     """One kernel for all values: numbers are read from an array, so that others need no kernel of their own."""
@@ -169,10 +189,12 @@ def _compiled(
     width = len(sources[0])
     sizes = module.UInt32(aligned(np.array([width, samples[0].shape[-1], rows]), np.uint32))
     # Sources of a sample lie side by side
-    given = [array(x) for x in sources], [array(x.T if x.ndim > 1 else x) for x in samples], array([0.0, *flat]), sizes
+    tables = [packets(x.data.ravel(), x.data.shape[-1], module, double=True) for x in read.tables]
+    lit = [array(x) for x in sources], [array(x.T if x.ndim > 1 else x) for x in samples]
+    given = *lit, array([0.0, *read.flat]), [table.values for table in tables], sizes
     with _launching:
         if kind not in _kernels:
-            _kernels[kind] = _kernel(module, function, sources, samples, numbers, rows)
+            _kernels[kind] = _kernel(module, function, sources, samples, numbers, tables, rows)
             if len(_kernels) > KERNELS:
                 _kernels.popitem(last=False)
         _kernels.move_to_end(kind)
@@ -192,7 +214,13 @@ def _compiled(
 
 
 def _kernel(
-    module: Any, function: Function, sources: Sequence[Array], samples: Sequence[Array], numbers: Any, rows: int
+    module: Any,
+    function: Function,
+    sources: Sequence[Array],
+    samples: Sequence[Array],
+    numbers: Any,
+    tables: Sequence[Packets],
+    rows: int,
 ) -> _Kernel:
     """The kernel of a kind: for each source a loop over the samples."""
     import drjit as dr
@@ -201,11 +229,20 @@ def _kernel(
     own = [x.ndim > 1 for x in samples]
 
     def launch(
-        source: Any, of_sources: Sequence[Any], of_samples: Sequence[Any], given: Any, sizes: Any, outs: Sequence[Any]
+        source: Any,
+        of_sources: Sequence[Any],
+        of_samples: Sequence[Any],
+        given: Any,
+        of_tables: Sequence[Any],
+        sizes: Any,
+        outs: Sequence[Any],
     ) -> tuple[list[Any], list[Any], Sequence[Any]]:
         width, count, last = (dr.gather(integer, sizes, k) for k in range(3))
-        places = itertools.count(1)
-        read = _mapped(numbers, lambda _: dr.gather(number, given, next(places)), module.Array3f64)
+        places, held = itertools.count(1), iter([replace(x, values=values) for x, values in zip(tables, of_tables)])
+        read = _mapped(
+            numbers,
+            _Reader(lambda _: dr.gather(number, given, next(places)), module.Array3f64, lambda _: next(held)),
+        )
 
         # Read before the loop, from which LLVM takes all that depends on sources alone
         at_source = [dr.gather(number, x, source) for x in of_sources]
@@ -217,7 +254,7 @@ def _kernel(
         def step(k: Any, sums: list[Any], largest: list[Any]) -> tuple[Any, list[Any], list[Any]]:
             more = found(k)
             for light, parts in zip(more.deposits, outs):
-                values = [value * wave for value in light.values for wave in light.waves]
+                values = [value * wave for value in _channels(light.values) for wave in light.waves]
                 first = module.Int64(light.first)
                 for j, share in enumerate(light.shares):
                     row = dr.select(first < 0, last, integer(first)) if j == 0 else integer(first + j)
@@ -270,25 +307,35 @@ def _nested(value: Any) -> bool:
     return bool(dr.depth_v(value) > 1)
 
 
-def _mapped(value: Any, number: Callable[[float], Any], colour: Callable[[list[Any]], Any] = list) -> Any:
-    """The value with all of its numbers, and its colours, replaced."""
+class _Reader(NamedTuple):
+    """Functions that make a kernel's values of numbers, of the channels of a colour, and of a table."""
+
+    number: Callable[[float], Any]
+    colour: Callable[[list[Any]], Any]
+    table: Callable[[Curves], Packets]
+
+
+def _mapped(value: Any, reader: _Reader) -> Any:
+    """The value with all of its numbers, its colours and its tables replaced."""
     if isinstance(value, Varying):
-        return [number(float(x)) for x in value]
+        return [reader.number(float(x)) for x in value]
     if isinstance(value, list | tuple):
-        each = [_mapped(x, number, colour) for x in value]
+        each = [_mapped(x, reader) for x in value]
         return type(value)(*each) if hasattr(value, "_fields") else type(value)(each)
+    if isinstance(value, Curves):
+        return replace(value, data=reader.table(value))
     if is_dataclass(value) and not isinstance(value, type):
         found = copy.copy(value)
         for x in fields(value):
-            object.__setattr__(found, x.name, _mapped(getattr(value, x.name), number, colour))
+            object.__setattr__(found, x.name, _mapped(getattr(value, x.name), reader))
         return found
     if isinstance(value, MethodType):
-        return getattr(_mapped(value.__self__, number, colour), value.__name__)
+        return getattr(_mapped(value.__self__, reader), value.__name__)
     if isinstance(value, np.ndarray) and value.size > 1:
-        return colour([number(float(x)) for x in value.ravel()])
+        return reader.colour([reader.number(float(x)) for x in value.ravel()])
     if isinstance(value, float | np.floating | np.ndarray):
         plain = float(np.asarray(value).item())
-        return plain if plain in (0, 1) else number(plain)
+        return plain if plain in (0, 1) else reader.number(plain)
     return value
 
 
@@ -296,38 +343,41 @@ class _Foreign(Exception):
     """A value has objects that kernels cannot read."""
 
 
-def _kind(value: Any, flat: list[float]) -> Hashable:
-    """A value without its numbers, which `flat` gets in the order of `_mapped`: equal where one kernel serves.
+def _kind(value: Any, read: _Read) -> Hashable:
+    """A value without its numbers, which `read` gets in the order of `_mapped`: equal where one kernel serves.
 
     Raises _Foreign for what no kernel reads.
     """
     if isinstance(value, Varying):
-        flat.extend(map(float, value))
+        read.flat.extend(map(float, value))
         return Varying, len(value)
     if isinstance(value, list | tuple):
-        return type(value), *[_kind(x, flat) for x in value]
+        return type(value), *[_kind(x, read) for x in value]
     if isinstance(value, np.ndarray):
         if value.size > 1:
             if value.ndim == 1 or value.size != COLOURS:
                 raise _Foreign
-            flat.extend(value.ravel().tolist())
+            read.flat.extend(value.ravel().tolist())
             return np.ndarray
         value = value.item()
     if isinstance(value, float | np.floating):
         plain = float(value)
         if plain in (0, 1):
             return plain
-        flat.append(plain)
+        read.flat.append(plain)
         return float
-    if value is None or isinstance(value, int):
+    if value is None or isinstance(value, int | str | type):
         return value
+    if isinstance(value, Curves) and isinstance(value.data, np.ndarray):
+        read.tables.append(value)
+        return Curves, value.data.shape
     if isinstance(value, MethodType):
-        return value.__name__, _kind(value.__self__, flat)
+        return value.__name__, _kind(value.__self__, read)
     own: Any = type(value)
     names = _fields(own)
     if names is None:
         raise _Foreign
-    return own, *[_kind(getattr(value, name), flat) for name in names]
+    return own, *[_kind(getattr(value, name), read) for name in names]
 
 
 @functools.lru_cache(maxsize=256)

@@ -50,11 +50,12 @@ class SampledGrid:
             return self._packets[dialect]
 
 
-def packets(flat: Any, count: int, dialect: Any) -> Packets:
+def packets(flat: Any, count: int, dialect: Any, double: bool = False) -> Packets:
     """All `count` channels of a flat array of NumPy or Dr.Jit, where those of one node follow those of another;
     differentiable.
 
-    `dialect` is the module of Dr.Jit. While it records a kernel, arrays must be those of NumPy.
+    `dialect` is the module of Dr.Jit; values of NumPy are in single precision there, or `double`. While it records a
+    kernel, arrays must be those of NumPy.
     """
     stride = -(-count // WIDTH) * WIDTH if count > WIDTH else 1 << (count - 1).bit_length()
     nodes, k = np.arange(0, len(flat), count)[:, None], np.minimum(np.arange(stride), count - 1)
@@ -65,7 +66,8 @@ def packets(flat: Any, count: int, dialect: Any) -> Packets:
         values = dr.gather(type(flat), flat, dialect.UInt32(aligned(places, np.uint32)))
         dr.eval(values)
         return Packets(values, stride, count)
-    return Packets(dialect.Float(aligned(flat[places])), stride, count)
+    number, dtype = (dialect.Float64, np.float64) if double else (dialect.Float, np.float32)
+    return Packets(number(aligned(flat[places], dtype)), stride, count)
 
 
 def aligned(flat: np.ndarray, dtype: Any = np.float32) -> np.ndarray:

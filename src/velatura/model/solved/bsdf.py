@@ -33,9 +33,10 @@ from velatura.model.variance import PerAxis, Roughness, Variance
 from velatura.ops import Value
 from velatura.optics import ggx
 from velatura.optics.ggx import Direction
-from velatura.renderer.directional_grid import Packed
+from velatura.renderer.directional_grid import Curves, Packed
 
 MAX_SAMPLE_WEIGHT = 2.9  # weight of a sample
+NOTHING = Remainder(*[0.0] * len(fields(Remainder)))
 
 
 class _Roots(RoughnessMap):
@@ -102,7 +103,7 @@ class Side:
 
     def read(self, w: Direction) -> Columns:
         """The columns for a direction above, as they are declared."""
-        found = self.declaration.read(self._values(self.declaration.columns, self.curves(w)))
+        found = self.declaration.read(self.values(self.declaration.columns, self.curves(w)))
         return replace(found, chance=ops.maximum(found.chance, 0.0))
 
     def either(self, other: Side, where: Value, w: Direction) -> Columns:
@@ -116,7 +117,7 @@ class Side:
         """Columns where what is wide is no more that of lobes."""
         return columns.narrowed([shape.interface > 0 for shape in self.shapes]) if self.wide else columns
 
-    def _values(self, columns: Iterable[Column], channels: Iterable[Value]) -> list[Value]:
+    def values(self, columns: Iterable[Column], channels: Iterable[Value]) -> list[Value]:
         """Numbers and colours of columns, by their rows."""
         rows = iter(channels)
 
@@ -130,29 +131,24 @@ class Side:
         """The side as light from a direction above sees it."""
         return self.given(w, self.at(w))
 
-    def part(self, k: int, w: Direction) -> SideView:
-        """The view from a direction above with the reflected part of number k alone, which is the first one. In
-        NumPy."""
-        weight, *others = self._only(w, self.declaration.part(k))
-        count = self.declaration.entries if k < len(self.shapes) else 0
-        roughness, beyond = others[:count], others[count:]
-        of_top, beyond = (beyond[0], beyond[1:]) if self.top and beyond else (None, beyond)
-        narrow, beyond = (beyond[0], beyond[1:]) if self.wide else (1.0, beyond)
-        columns = Columns([weight], [tuple(roughness)], [], [], weight, 0.0, 0.0, None, None, of_top, narrow, beyond)
-        part = replace(self, shapes=self.shapes[k : k + 1])
-        return part.given(w, part.narrowed(columns))
+    def part(self, k: int) -> SidePart:
+        """The reflected part of number k, of a side in NumPy."""
+        shapes, alone = self.shapes[k : k + 1], replace(self, curves=None, transmission=None)
+        if shapes:
+            alone = replace(alone, polynomial=NOTHING, samples=NOTHING.samples, top=None)
+        return SidePart(replace(alone, shapes=shapes), *self._only(self.declaration.part(k)))
 
-    def through(self, w: Direction) -> SideView:
-        """The view from a direction above with what passes alone. In NumPy."""
-        found, count = self._only(w, self.declaration.through), len(self.declaration.parts)
-        columns = Columns([], [], [], [], 0.0, 0.0, 0.0, Parts(*found[:count]), None, wide_passed=found[count:])
-        return replace(self, shapes=(), top=None).given(w, self.narrowed(columns))
+    @property
+    def through(self) -> SidePart:
+        """The part that passes, of a side in NumPy."""
+        alone = replace(self, curves=None, shapes=(), polynomial=NOTHING, samples=NOTHING.samples, top=None)
+        return SidePart(alone, *self._only(self.declaration.through))
 
-    def _only(self, w: Direction, chosen: Sequence[int]) -> list[Value]:
-        """Values of columns of some numbers; others are not read."""
+    def _only(self, chosen: Sequence[int]) -> tuple[tuple[Column, ...], Any]:
+        """Columns of some numbers, and curves of them alone."""
         columns = self.declaration.columns
         rows = self.declaration.rows(chosen, self.colours)
-        return self._values([columns[k] for k in chosen], self.curves.only(rows)(w))
+        return tuple(columns[k] for k in chosen), self.curves.only(rows)
 
     def given(self, w: Direction, columns: Columns) -> SideView:
         """The view from a direction above, by the columns for it."""
@@ -162,6 +158,30 @@ class Side:
         plane = ggx.plane(w) if self.kind is PerAxis else None
         samples = TopSamples(self.samples, self.top, columns.of_top) if self.top else self.samples
         return SideView(self.shapes, lobes, plane, self.polynomial, samples, self.transmission, columns, self.top)
+
+
+@dataclass(frozen=True)
+class SidePart:
+    """One part of a `side` in NumPy, which reads no columns but its own."""
+
+    side: Side
+    columns: tuple[Column, ...]
+    curves: Curves
+
+    def seen(self, w: Direction) -> SideView:
+        """The view from a direction above with this part alone; a reflected one is the first one."""
+        side, found = self.side, self.side.values(self.columns, self.curves(w))
+        if side.transmission:
+            count = len(side.declaration.parts)
+            columns = Columns([], [], [], [], 0.0, 0.0, 0.0, Parts(*found[:count]), None, wide_passed=found[count:])
+            return side.given(w, side.narrowed(columns))
+        weight, *others = found
+        count = side.declaration.entries if side.shapes else 0
+        roughness, beyond = others[:count], others[count:]
+        of_top, beyond = (beyond[0], beyond[1:]) if side.top else (None, beyond)
+        narrow, beyond = (beyond[0], beyond[1:]) if side.wide else (1.0, beyond)
+        columns = Columns([weight], [tuple(roughness)], [], [], weight, 0.0, 0.0, None, None, of_top, narrow, beyond)
+        return side.given(w, side.narrowed(columns))
 
 
 @dataclass(frozen=True)

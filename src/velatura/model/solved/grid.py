@@ -12,11 +12,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from velatura import ops
 from velatura.model.guards import ALPHA_MIN
 from velatura.model.solved import monotone_cubic
 from velatura.model.solved.columns import Columns
 from velatura.model.solved.guards import COS_ON_GRID_MIN
 from velatura.model.solved.transmission.combined import Parts
+from velatura.ops import Value
+from velatura.optics.ggx import Direction
 from velatura.renderer import directional_grid
 from velatura.stack import InterfaceValues, Material
 
@@ -74,17 +77,29 @@ class Grid:
         sine = np.sqrt(1 - self.cosine * self.cosine)
         return sine * np.cos(self.phi), sine * np.sin(self.phi), self.cosine
 
-    def shares(self, w: tuple[Array, Array, Array]) -> list[tuple[Array, Array]]:
-        """Nodes and weights of the linear interpolation at directions above."""
-        place = np.sqrt(np.clip(w[2], 0, 1)) * (self.cosines - 1)
-        cell = np.minimum(place.astype(int), self.cosines - 2)
-        along = [(cell, 1 - (place - cell)), (cell + 1, place - cell)]
-        if self.isotropic:
-            return along
-        turn = (np.arctan2(w[1], w[0]) % np.pi) * (self.turns / np.pi)
-        first = turn.astype(int)
-        around = [(first % self.turns, 1 - (turn - first)), ((first + 1) % self.turns, turn - first)]
-        return [(k * self.turns + m, x * y) for k, x in along for m, y in around]
+    @property
+    def closed(self) -> tuple[int, ...]:
+        """Cosines, and azimuths from 0 to half a turn, which is 0 again, between which functions are interpolated."""
+        return (self.cosines,) if self.isotropic else (self.cosines, self.azimuths + 1)
+
+    def places(self, w: Direction) -> list[Value]:
+        """Coordinates from 0 to 1 of a direction above, on any dialect."""
+        turns = ops.arctan2(w[1], w[0]) * (1 / np.pi)
+        return [ops.sqrt(w[2]), *([] if self.isotropic else [turns - ops.floor(turns)])]
+
+    def stencils(self, w: Direction) -> list[tuple[Value, list[Value]]]:
+        """Nodes that a direction above lies between, of those that are `closed`: the first of some that lie side by
+        side, and shares of linear interpolation."""
+        cells = []
+        for x, count in zip(self.places(w), self.closed):
+            place = ops.minimum(x, 1.0) * (count - 1)
+            cell = ops.minimum(ops.floor(place), count - 2)
+            cells.append((cell, place - cell))
+        (cell, share), *others = cells
+        if not others:
+            return [(cell, [1 - share, share])]
+        (turn, upper), width = others[0], self.closed[1]
+        return [((cell + k) * width + turn, [x * (1 - upper), x * upper]) for k, x in enumerate((1 - share, share))]
 
     def spread(self, rows: Array, shape: tuple[int, ...]) -> Array:
         """Values at the nodes, (..., M), interpolated, (..., prod(shape)): by splines over the cosine, by waves over
@@ -171,10 +186,11 @@ class Folded:
     def _of(self, values: Array) -> Array:
         return values.reshape(-1, self.grid.turns)[:, self.kept].ravel()
 
-    def shares(self, w: tuple[Array, Array, Array]) -> list[tuple[Array, Array]]:
-        """Interpolation nodes and weights on the folded grid."""
-        places = np.arange(self.grid.cosines)[:, None] * len(self.kept) + self.source
-        return [(places.ravel()[index], share) for index, share in self.grid.shares(w)]
+    @property
+    def closed(self) -> NDArray[np.integer]:
+        """Numbers of these directions that the nodes of the grid, `closed`, look like: (cosines, azimuths)."""
+        source = self.source if self.grid.isotropic else np.r_[self.source, self.source[:1]]
+        return np.arange(self.grid.cosines)[:, None] * len(self.kept) + source
 
     def around(self, values: Array) -> Array:
         """Values for cosines, (..., cosines), at all of these directions."""

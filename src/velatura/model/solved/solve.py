@@ -41,7 +41,7 @@ from velatura.model.variance import Covariance, Isotropic, PerAxis, Roughness, V
 from velatura.ops import Value
 from velatura.optics.ggx import Direction
 from velatura.optics.phase import HenyeyGreenstein, PhaseFunction
-from velatura.renderer import directional_grid, finite_differences, low_discrepancy
+from velatura.renderer import compiled, directional_grid, finite_differences, low_discrepancy
 from velatura.renderer.differentiated import RELATIVE, Variables
 from velatura.renderer.differentiated import plain as plain
 from velatura.renderer.directional_grid import Packing
@@ -125,9 +125,9 @@ class SolvedSide:
         """Those of the remainder, (8 C,), and after them those of a medium on top."""
         return np.concatenate([*vars(self.polynomial).values(), *self.top])
 
-    def weighed(self, factors: Sequence[Array], wanted: Demand) -> SolvedSide:
+    def weighed(self, factors: Sequence[Array], wanted: Demand | None) -> SolvedSide:
         """The side with weights of reflected parts, and of what passes, scaled by factors (C, M), and samples shared
-        anew where nothing passes."""
+        anew as `wanted`, None where light passes."""
         columns = self.columns
         weights = [factor * weight for factor, weight in zip(factors, columns.weights)]
         rest = factors[len(weights)]
@@ -135,7 +135,7 @@ class SolvedSide:
         columns = replace(columns, weights=weights, scale=rest * columns.scale, wide_reflected=beyond)
         if columns.passes:
             columns = replace(columns, passes=replace(columns.passes, straight=factors[-1]))
-        else:
+        if wanted:
             *chances, chance = sample_allocation.shared(_evened(wanted))
             columns = replace(columns, chances=chances, chance=chance)
         return replace(self, columns=columns)
@@ -295,17 +295,13 @@ class Solver:
         if self.model.form == "forward":
             return found
         numbers, folded = self.body(material, found, layouts), Folded.of(self.grid.coarser(material), material)
-        factors, wanted = reciprocal_balance.factors(
-            numbers, folded.directions, folded.shares, folded.count, self.samples, _share(len(material.interfaces))
-        )
+        factors, wanted = reciprocal_balance.factors(numbers, folded, self.samples, _share(len(material.interfaces)))
 
         def spread(values: Array) -> Array:
             return folded.grid.refined(folded.everywhere(values), self.grid)
 
-        return [
-            side.weighed(list(map(spread, each)), Demand(*map(spread, of)))
-            for side, each, of in zip(found, factors, wanted)
-        ]
+        demands: list[Demand | None] = [each and Demand(*map(spread, each)) for each in wanted]
+        return [side.weighed(list(map(spread, each)), of) for side, each, of in zip(found, factors, demands)]
 
     def body(self, material: Material, found: Sequence[SolvedSide], layouts: Sequence[Layout]) -> Solved:
         """The BSDF in NumPy."""
@@ -317,7 +313,8 @@ class Solver:
 
     def _in_numpy(self, material: Material, numbers: Array, layout: Layout, curves: Any) -> Side:
         each = [*numbers.reshape(-1, self.colours, 1)]
-        return self.side(material, layout, curves, each, Context(colour=_stacked, tables=self.tables))
+        stacked = compiled.Colour(np.ones((self.colours, 1)))
+        return self.side(material, layout, curves, each, Context(colour=stacked, tables=self.tables))
 
     def side(self, material: Material, layout: Layout, curves: Any, numbers: Sequence[Value], context: Context) -> Side:
         """A side of a material of a renderer's values, those of one point or of all; `numbers` are colours in the order
@@ -691,10 +688,6 @@ def _scattered(top: TopMedium, nodes: Nodes, through: bool) -> tuple[list[Array]
     for own, *others in zip(*each):
         found.append([np.reshape(top.albedo, (-1, 1, 1, 1)) * own, *others])
     return found[0], found[1] if through else []
-
-
-def _stacked(*channels: Array) -> Array:
-    return np.stack(channels)
 
 
 def layout_of(materials: Sequence[Material], veiled: Set[int] = frozenset()) -> Layout:

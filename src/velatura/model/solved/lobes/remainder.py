@@ -123,7 +123,8 @@ class RemainderSamples:
         low, tilt = self._bright(wi)
         grazing = u1 < low
         u1 = ops.clip(ops.divide(ops.select(grazing, u1, u1 - low), ops.select(grazing, low, 1 - low)), 0.0, 1.0)
-        z = ops.power(ops.maximum(u1, ops.TINY), ops.select(grazing, 2 / 3, 0.5))
+        u1 = ops.maximum(u1, ops.TINY)
+        z = ops.select(grazing, ops.power(u1, 2 / 3), ops.sqrt(u1))
         radius, phi = ops.sqrt(1 - z * z), 2 * pi * u2
         x, y = radius * ops.cos(phi), radius * ops.sin(phi)
         side = ops.select(2 * u < 1 + _tilted(tilt, wi, (x, y, z)), 1.0, -1.0)

@@ -27,7 +27,7 @@ from __future__ import annotations
 
 import operator
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, is_dataclass, replace
+from dataclasses import dataclass, fields, is_dataclass, replace
 from functools import reduce
 from itertools import accumulate
 from math import pi
@@ -57,6 +57,7 @@ from velatura.optics import fresnel, ggx
 from velatura.optics.ggx import Direction
 from velatura.renderer import compiled, low_discrepancy
 from velatura.renderer.compiled import Found
+from velatura.renderer.directional_grid import Curves
 from velatura.stack import InterfaceValues, Material, SlabValues
 from velatura.stack.chain import chain
 
@@ -579,13 +580,15 @@ def _passed(sources: Sequence[Value], samples: Sequence[Value], transmission: Tr
 
 
 def wider(values: Any) -> Any:
-    """Records of arrays, with one axis more."""
+    """Records of arrays, with one axis more; tables stay as they are."""
     if isinstance(values, np.ndarray):
         return values[..., None]
+    if isinstance(values, Curves):
+        return values
     if isinstance(values, Roughness):
         return Roughness(*map(wider, values))
     if isinstance(values, tuple):
         return tuple(map(wider, values))
     if is_dataclass(values) and not isinstance(values, type):
-        return type(values)(*(wider(x) for x in vars(values).values()))
+        return replace(values, **{x.name: wider(getattr(values, x.name)) for x in fields(values)})
     return values
