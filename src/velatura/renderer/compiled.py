@@ -101,10 +101,10 @@ def over(
         with contextlib.suppress(_Foreign):
             read = _Read([], [])
             kind = function.__module__, function.__qualname__, kind, *(x.ndim for x in samples), _kind(numbers, read)
-            kernels = kernel.llvm() if _asked[kind] >= (MANY_DEPOSITED if rows else MANY) else None
+            _asked[kind] += width * count
+            kernels = kernel.llvm() if _asked[kind] > (MANY_DEPOSITED if rows else MANY) else None
             if kernels:
                 return _compiled(kernels, kind, function, sources, samples, numbers, read, rows)
-            _asked[kind] += width * count
     size = max(BLOCK // count, 1)
     found = []
     for first in range(0, max(width, 1), size):
