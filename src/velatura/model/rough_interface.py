@@ -23,7 +23,7 @@ from velatura.ops import Value
 from velatura.optics import fresnel, ggx, refraction
 from velatura.optics.ggx import Direction
 from velatura.renderer import compiled
-from velatura.renderer.compiled import Found, Varying
+from velatura.renderer.compiled import Found, Number
 from velatura.renderer.kept import Kept
 from velatura.renderer.low_discrepancy import STEPS, fibonacci
 from velatura.stack import InterfaceValues
@@ -283,7 +283,7 @@ class FirstEvents:
         straight = facets.straight(self.ways[-1])
         share = 1 / len(fibonacci(samples)[0])
         found = n, *alpha, turns, eta, straight, share, *np.concatenate([*indices, []])
-        return Varying(found), facets.films
+        return [*map(Number, found)], facets.films
 
     def __call__(
         self, sources: Sequence[Value], samples: Sequence[Value], numbers: Any

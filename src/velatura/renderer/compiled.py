@@ -73,8 +73,8 @@ class Colour:
         return channels[0] if len(channels) == 1 else type(self.white)(*channels)
 
 
-class Varying(tuple[Value, ...]):
-    """Numbers none of which belongs to the kind of a function, 0.0 and 1.0 included."""
+class Number(float):
+    """A number that never belongs to the kind of a function, 0.0 and 1.0 included."""
 
 
 #: Of sources, samples and numbers; in kernels a choice between two constants is one of single precision
@@ -93,8 +93,8 @@ def over(
     (G, S), and of each light what falls on `rows`, and on the one beyond: (values, waves, rows + 1, S).
 
     `numbers` are a list, a tuple or a record: of others, of numbers, of colours (3, 1, ...), and of `Curves` of NumPy.
-    What is no number, and 0.0 and 1.0 but for those that are `Varying`, belong to the kind of function, as does all
-    else that it depends on, `kind`. It runs by NumPy alone if other objects are among them.
+    What is no number, and 0.0 and 1.0 unless each is a `Number`, belong to the kind of function, as does all else that
+    it depends on, `kind`. It runs by NumPy alone if other objects are among them.
     """
     count, width = samples[0].shape[-1], len(sources[0])
     if width * count > LEAST:
@@ -317,8 +317,8 @@ class _Reader(NamedTuple):
 
 def _mapped(value: Any, reader: _Reader) -> Any:
     """The value with all of its numbers, its colours and its tables replaced."""
-    if isinstance(value, Varying):
-        return [reader.number(float(x)) for x in value]
+    if isinstance(value, Number):
+        return reader.number(value)
     if isinstance(value, list | tuple):
         each = [_mapped(x, reader) for x in value]
         return type(value)(*each) if hasattr(value, "_fields") else type(value)(each)
@@ -348,9 +348,9 @@ def _kind(value: Any, read: _Read) -> Hashable:
 
     Raises _Foreign for what no kernel reads.
     """
-    if isinstance(value, Varying):
-        read.flat.extend(map(float, value))
-        return Varying, len(value)
+    if isinstance(value, Number):
+        read.flat.append(value)
+        return Number
     if isinstance(value, list | tuple):
         return type(value), *[_kind(x, read) for x in value]
     if isinstance(value, np.ndarray):

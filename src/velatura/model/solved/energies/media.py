@@ -27,7 +27,7 @@ from velatura.model.solved.guards import (
 from velatura.ops import Value
 from velatura.optics.ggx import Direction
 from velatura.optics.phase import HenyeyGreenstein, PhaseFunction, deflect
-from velatura.renderer.compiled import Varying
+from velatura.renderer.compiled import Number
 from velatura.renderer.low_discrepancy import fibonacci
 from velatura.stack import SlabValues
 
@@ -124,7 +124,7 @@ def _scattered(slab: Slab, p: Array, psi: Array, setting: Setting) -> tuple[Arra
     key = _scattered, slab.phase.key, setting.events, *momenta, psi.tobytes()
     lattice = _lattice(slab.phase, setting.events)
     return tuple(
-        setting.kept(key, lambda: setting.basis.deposited(_events, p, psi, lattice, Varying([slab.n]), _events)[0])
+        setting.kept(key, lambda: setting.basis.deposited(_events, p, psi, lattice, [Number(slab.n)], _events)[0])
     )
 
 
@@ -173,7 +173,7 @@ def escaped(phase: PhaseFunction, depth: Array, basis: Basis, p: Array, through:
             lights.append(Light(x, y, [share * down * passing(depth, z_i, down)[through] for depth in depths]))
         return lights, []
 
-    lattice, numbers = _lattice(phase, True), Varying(depth.tolist())
+    lattice, numbers = _lattice(phase, True), [*map(Number, depth)]
     return basis.deposited(escapes, p, np.zeros_like(p), lattice, numbers, (escaped, through))[0]
 
 

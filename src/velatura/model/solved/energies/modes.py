@@ -25,7 +25,7 @@ from velatura.model.solved.energies.operators import Operator
 from velatura.model.solved.guards import MOMENTUM_MIN
 from velatura.ops import Value
 from velatura.renderer import compiled
-from velatura.renderer.compiled import Deposit, Found, Varying
+from velatura.renderer.compiled import Deposit, Found, Number
 
 Array = NDArray[np.floating]
 
@@ -99,7 +99,7 @@ class Basis(ABC):
 
         kind = kind, self.kind, len(self.nodes.cells)
         others, _, lights = compiled.over(
-            function, (p, psi), samples, (Varying(parts), numbers), self.nodes.count, kind
+            function, (p, psi), samples, ([*map(Number, parts)], numbers), self.nodes.count, kind
         )
         # What lies on the far side of 0
         sign = np.where(self.odd, -1, 1)[:, None]

@@ -56,7 +56,7 @@ from velatura.ops import Value
 from velatura.optics import fresnel, ggx
 from velatura.optics.ggx import Direction
 from velatura.renderer import compiled, low_discrepancy
-from velatura.renderer.compiled import Found
+from velatura.renderer.compiled import Found, Number
 from velatura.renderer.directional_grid import Curves
 from velatura.stack import InterfaceValues, Material, SlabValues
 from velatura.stack.chain import chain
@@ -554,7 +554,10 @@ def integrals(
     middle = *(bound * x for x in i.p), u, v, np.cos(rotation), np.sin(rotation)
     rays = np.tile(share, nodes[1]), np.tile(weight * (pi / nodes[1]), nodes[1])
     around = np.repeat(np.cos(phi), nodes[0]), np.repeat(np.sin(phi), nodes[0])
-    found, _, _ = compiled.over(_passed, (*wi, *middle), (*rays, *around), wider(transmission))
+    # One kernel serves both sides
+    refractions = [replace(each, sign=Number(np.ravel(each.sign)[0])) for each in transmission.refractions]
+    alone = Transmission(wider(tuple(refractions)), wider(transmission.slabs), (), (), (), False, False)
+    found, _, _ = compiled.over(_passed, (*wi, *middle), (*rays, *around), alone)
     *energy, passes = found
     count = len(energy) // 2
     return np.array(energy[:count]), np.array(energy[count:]), passes
