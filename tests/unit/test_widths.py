@@ -138,7 +138,7 @@ WALKED = {
     "lacquered": [Interface(eta=1.5, alpha=0.1), Interface(eta=0.3, k=3.0, alpha=(0.3, 0.04), rotation=60)],
     "glass": [Interface(eta=1.5, alpha=0.2), Interface(eta=2.0, alpha=0.2)],
 }
-FARTHEST = {"brushed": 0.065, "lacquered": 0.04}
+FARTHEST = {"brushed": 0.045, "lacquered": 0.04}
 
 
 def binned(lobe: RefractedLobe, cosine: float, bins: int) -> Array:

@@ -6,6 +6,9 @@ in and out, those of the interfaces above it, in units of its own moves; they ad
 (q = 1) and Gauss (q = 2), as the long tails of GGX ask for. Facets that are seen at a slant are those that face the
 light: the cosine at which it meets them grows with their roughness.
 
+Visible facets of a brushed coat that lies askew to the plane of incidence move light to one side, and so turn the lobes
+below it.
+
 What first order leaves open is in `CORRECTION`: light that goes back and forth, and that total reflection picks out.
 It turns above all on how much brighter a lobe is than it would be if its light met each interface once.
 Lobes of metals whose facets are long along an axis have `BRUSHED_CORRECTION` in its place, and turn little with the
@@ -140,6 +143,18 @@ class _Coat:
         )
         return self.tensor.stretched(np.abs(x), np.abs(y))
 
+    @functools.cached_property
+    def aside(self) -> Array:
+        """Momentum across the plane of incidence that light gains, in the mean over visible normals, on its way in.
+
+        A hemisphere of normals, seen from w, has a mean of about 2/3 w; facets of a tensor are one that is stretched.
+        """
+        cos2 = self.cosine * self.cosine
+        below = np.sqrt(np.maximum(self.n_below**2 - (1 - cos2) * self.n**2, COS_OF_WIDTHS_MIN**2))
+        sine = np.sqrt(1 - cos2)
+        slope = 2 / 3 * self.tensor.xy * sine / np.sqrt(self.tensor.xx * sine * sine + cos2)
+        return np.asarray((self.n * self.cosine - below) * slope)
+
 
 @dataclass(frozen=True)
 class _Outlet:
@@ -194,7 +209,7 @@ def tensors(found: Sequence[Part], cos_theta: Array, phi: Array, energies: Array
         cosine = _cosine(cos_theta, n)
         own = Tensor.of(part, phi)
         if coats:
-            first = _first_order(own, coats, n, cosine)
+            first = _turned_aside(_first_order(own, coats, n, cosine), coats, n, cosine)
             seen = features(part, first, own, coats, cos_theta, share, energies[len(result)])
             result.append(_corrected(first, seen))
         else:
@@ -215,6 +230,14 @@ def _first_order(own: Tensor, coats: Sequence[_Coat], n: float, cosine: Array) -
 
     simple = total(cosine, cosine)
     return total(*(np.sqrt(cos2) for cos2 in _steeper(cosine, np.sqrt(simple.xx), fitted.OWN_STEEPNESS)))
+
+
+def _turned_aside(first: Tensor, coats: Sequence[_Coat], n: float, cosine: Array) -> Tensor:
+    """The tensor of a lobe whose light brushed coats have moved across the plane of incidence: sheared, so that light
+    as far from the mirror's direction as the lobe is wide lies aside by that move."""
+    aside = sum(coat.aside for coat in coats) / (2 * n * cosine)
+    shear = aside / np.sqrt(first.xx)
+    return Tensor(first.xx, first.xy + shear * first.xx, first.yy + 2 * shear * first.xy + aside * aside)
 
 
 def features(
