@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -56,6 +56,15 @@ class Variables:
         low, high = (x if np.any(denser & ~_denser(self._with(self.start, k, end))) else end for end in ends)
         return (low, high) if low < high else ends
 
+    def matched(self) -> Iterator[tuple[int, float, tuple[float, float]]]:
+        """Indices beside a kink, whose steps end there, or over which another side of an interface gets the denser one:
+        the number of the variable, its value, and the ends of the step."""
+        for k, x in enumerate(self._numbers):
+            if self.addresses[self.given[k].places[0][0]].role == "eta":
+                ends = self.around(k, x)
+                if x in ends or len({_steps(self._with(self.start, k, each)) for each in ends}) > 1:
+                    yield k, x, ends
+
     def ends(self, material: Material) -> Iterator[Material]:
         """A material of NumPy's values with the numbers at both ends of the step of each variable."""
         for k, x in enumerate(self._numbers):
@@ -70,6 +79,24 @@ class Variables:
         """A material of NumPy's values with x for the k-th variable."""
         numbers = self._numbers
         return self.replaced(material, [*numbers[:k], x, *numbers[k + 1 :]])
+
+    def without(self, material: Material, variables: Sequence[int]) -> Material:
+        """A renderer's material without the gradients of some variables."""
+        import drjit as dr
+
+        chosen = self._places(variables)
+        return _by_channel(material, lambda place, x: dr.detach(x) if place in chosen else x)
+
+    def moved(self, material: Material, k: int, step: float) -> Material:
+        """A renderer's material without gradients, the k-th variable a step further."""
+        import drjit as dr
+
+        chosen = self._places([k])
+        return _by_channel(material, lambda place, x: dr.detach(x) + step if place in chosen else dr.detach(x))
+
+    def _places(self, variables: Sequence[int]) -> set[tuple[str, int]]:
+        """Names and channels of the values of variables."""
+        return {(self.addresses[at].name, channel) for k in variables for at, channel in self.given[k].places}
 
     def replaced(self, material: Material, numbers: Sequence[float]) -> Material:
         """The material of NumPy's values, floats or colours (C, 1), with these numbers of the variables."""
@@ -92,6 +119,20 @@ class Variables:
         return material.each(value)
 
 
+def _by_channel(material: Material, change: Callable[[tuple[str, int], Any], Any]) -> Material:
+    """A renderer's material with each channel changed, by its name and number."""
+    import drjit as dr
+
+    def value(address: Address, old: Any) -> Any:
+        if not dr.is_array_v(old):
+            return old
+        if dr.depth_v(old) == 1:
+            return change((address.name, 0), old)
+        return type(old)([change((address.name, k), channel) for k, channel in enumerate(old)])
+
+    return material.each(value)
+
+
 def _denser(material: Material) -> NDArray[np.bool_]:
     """Whether each medium that light leaves by an interface is no rarer than the outside, seen from either side."""
     found = []
@@ -99,6 +140,16 @@ def _denser(material: Material) -> NDArray[np.bool_]:
         outside = (1 - ROUNDED) * np.mean(seen.exterior)
         found += [np.mean(each.above) >= outside for each in chain(seen) if isinstance(each.layer, InterfaceValues)]
     return np.array(found, bool)
+
+
+def _steps(material: Material) -> tuple[bool, ...]:
+    """Whether the medium below each interface of a dielectric is no rarer than that above it."""
+    each = ((meeting.layer, meeting.above) for meeting in chain(material))
+    return tuple(
+        bool(np.mean(layer.eta) >= (1 - ROUNDED) * np.mean(above))
+        for layer, above in each
+        if isinstance(layer, InterfaceValues) and layer.kind == "dielectric"
+    )
 
 
 def plain(material: Material) -> Material:
