@@ -32,10 +32,17 @@ PANE = [
     Interface(eta=1.0, alpha=0.3),
 ]
 PAINT = [Interface(eta=1.5), Medium(sigma_a=0.2), Diffuse(albedo=(0.9, 0.5, 0.2))]
+COATS = [
+    Interface(eta=1.3, alpha=0.1),
+    Medium(sigma_a=0.1),
+    Interface(eta=1.8, alpha=0.2),
+    Interface(eta=0.2, k=3.9, alpha=0.1),
+]
 BRUSHED = [Interface(eta=1.5, alpha=0.1), Interface(eta=0.2, k=3.9, alpha=(0.4, 0.1), rotation=30)]
 CASES = {
     "metal": (METAL, "fgd-multi", 0.7),
     "brushed": (BRUSHED, "fgd", 0.5),
+    "coats": (COATS, "fgd", 0.4),
     "paint": (PAINT, "fgd", 0.7),
     "pane": (PANE, "fgd", 0.7),
     "pane from below": (PANE, "fgd", -0.5),

@@ -8,7 +8,7 @@ facets reflect the share of it that follows; densities, which only weigh strateg
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from math import pi
 
 from velatura import ops
@@ -108,6 +108,32 @@ def sample_refraction(meeting: SurfaceMeeting, u1: Value, u2: Value) -> Scatteri
     return ScatteringEvent(surface.out_of(o), weight, False, density, back, density, density * share)
 
 
+def sample_reflection(meeting: SurfaceMeeting, u1: Value, u2: Value) -> ScatteringEvent:
+    """Reflect without a choice; densities as of `sample_refraction`."""
+    return _with_diffuse_base(
+        meeting,
+        lambda: _sample_reflection(meeting, u1, u2),
+        lambda: _from_outside(_sample_diffuse(meeting, u1, u2)),
+    )
+
+
+def _sample_reflection(meeting: SurfaceMeeting, u1: Value, u2: Value) -> ScatteringEvent:
+    surface = meeting.layers.surface(meeting.j)
+    i = surface.into(meeting.wi)
+    h = surface.sample_normal(i, u1, u2)
+    o = ggx.reflect(i, h)
+    reflectance, _ = meeting.shares(ggx.dot(i, h))
+    weight = ops.select(o[2] > 0, reflectance * surface.masking(o), 0.0)
+    density, back = (ops.select(surface.smooth, 1.0, each) for each in _densities(surface, i, h, o, 1.0))
+    share = mean(reflectance)
+    return ScatteringEvent(surface.out_of(o), weight, True, density, back * share, density, density * share)
+
+
+def _from_outside(event: ScatteringEvent) -> ScatteringEvent:
+    """An event that has no other choice, with the densities of `sample_reflection`."""
+    return replace(event, reverse=event.density)
+
+
 def _sample_interface(meeting: SurfaceMeeting, carried: Value, u1: Value, u2: Value, u3: Value) -> ScatteringEvent:
     # Meet a visible normal
     surface, eta = meeting.layers.surface(meeting.j), meeting.eta
@@ -166,12 +192,13 @@ def _sample_diffuse(meeting: SurfaceMeeting, u1: Value, u2: Value) -> Scattering
     radius, phi, z = ops.sqrt(u1), 2 * pi * u2, ops.sqrt(1 - u1)
     wo = radius * ops.cos(phi), radius * ops.sin(phi), z
     light = meeting.light and unpolarised(wo, meeting.light.q)
-    return ScatteringEvent(wo, meeting.layers.albedo, True, z / pi, 0.0, 0.0, meeting.wi[2] / pi, light)
+    density, back = z / pi, meeting.wi[2] / pi
+    return ScatteringEvent(wo, meeting.layers.albedo, True, density, back, density, back, light)
 
 
 def _evaluate_diffuse(meeting: SurfaceMeeting, wo: Direction) -> ScatteringEvent:
-    density = ops.maximum(wo[2], 0.0) / pi
-    return ScatteringEvent(wo, meeting.layers.albedo * density, True, density, 0.0, 0.0, meeting.wi[2] / pi)
+    density, back = ops.maximum(wo[2], 0.0) / pi, meeting.wi[2] / pi
+    return ScatteringEvent(wo, meeting.layers.albedo * density, True, density, back, density, back)
 
 
 def _with_diffuse_base(

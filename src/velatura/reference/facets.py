@@ -6,6 +6,7 @@ are unknown; those of single ones, on top of a small constant, serve to weigh st
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -21,14 +22,14 @@ from velatura.reference.metal import mean
 _MOST_EVENTS = 1000
 _FLOOR = 0.02  # density, per steradian
 
-UP = (0.0, 0.0, 1.0)
+Target = tuple[Direction, Value]  # and whether it lies on the side of reflection
 
 
 @dataclass
 class Flight:
     """Light between facets: its direction of travel, and the rank of its height, both as seen from its own medium.
 
-    Beyond the interface (not `outside`) that is upside down. `weight` and `value` are colours; `light` is the
+    Beyond the interface (not `outside`) that is upside down. `weight` and `values` are colours; `light` is the
     polarisation, None where it is left out.
     """
 
@@ -37,36 +38,39 @@ class Flight:
     rank: Value
     outside: Value
     weight: Value
-    value: Value
+    values: list[Value]
     count: Value
     alive: Value
     light: Polarisation | None
 
 
 def scatter(
-    types: Any, meeting: SurfaceMeeting, carried: Value, rng: Any, active: Value, target: Direction, reflected: Value
-) -> tuple[ScatteringEvent, ScatteringEvent, Any]:
-    """Scatter until the light leaves the interface; also the value for the direction `target`.
+    types: Any, meeting: SurfaceMeeting, carried: Value, rng: Any, active: Value, targets: Sequence[Target]
+) -> tuple[ScatteringEvent, list[ScatteringEvent], Any]:
+    """Scatter until the light leaves the interface; also the values for the directions `targets`.
 
     The value of the first facet is its mean over all heights, that of later ones an estimate.
     """
     # Scatter as if smooth or diffuse, where it is
     once = events.sample(meeting, carried, *(rng.next_float32() for _ in range(3)))
-    towards = events.evaluate(meeting, target, reflected)
+    towards = [events.evaluate(meeting, *target) for target in targets]
     surface = meeting.layers.surface(meeting.j)
     rough = surface.smooth ^ True
     if meeting.layers.base == "diffuse":
         rough &= meeting.opaque ^ True
     # Scatter between the facets elsewhere
-    flight = _fly(types, meeting, carried, rng, active & rough, surface.into(target))
+    flight = _fly(types, meeting, carried, rng, active & rough, [surface.into(w) for w, _ in targets])
     wo = surface.out_of(ops.select_record(flight.outside, flight.w, _reverse(flight.w)))
     many = _weighed(events.evaluate(meeting, wo, flight.outside), flight.weight)
     if flight.light is not None:
         many = replace(
             many, light=ops.select_record(flight.outside, flight.light, flight.light.inverted).seen_by(surface.out_of)
         )
-    value = _weighed(towards, towards.weight * _unmasked(meeting, target, reflected) + flight.value)
-    return ops.select_record(rough, many, once), ops.select_record(rough, value, towards), flight.rng
+    values = [
+        ops.select_record(rough, _weighed(event, event.weight * _unmasked(meeting, *target) + later), event)
+        for target, event, later in zip(targets, towards, flight.values)
+    ]
+    return ops.select_record(rough, many, once), values, flight.rng
 
 
 def sample_refraction(types: Any, meeting: SurfaceMeeting, rng: Any) -> tuple[ScatteringEvent, Any]:
@@ -77,7 +81,7 @@ def sample_refraction(types: Any, meeting: SurfaceMeeting, rng: Any) -> tuple[Sc
     rough = surface.smooth ^ True
     # Scatter between the facets elsewhere
     colour = types.Float(1) + 0.0 * meeting.shares(1.0)[0]
-    flight = _fly(types, meeting, colour, rng, rough, UP)
+    flight = _fly(types, meeting, colour, rng, rough, [])
     through = flight.outside ^ True
     wo = ops.select_record(through, surface.out_of(_reverse(flight.w)), once.wo)
     # Weigh by what single events would do, here and back
@@ -91,9 +95,35 @@ def sample_refraction(types: Any, meeting: SurfaceMeeting, rng: Any) -> tuple[Sc
     return ops.select_record(rough, many, once), flight.rng
 
 
-def _fly(types: Any, meeting: SurfaceMeeting, carried: Value, rng: Any, active: Value, target: Direction) -> Flight:
-    """Follow light from facet to facet; `target` is a direction away from the surface, up or down, and gathered is what
-    facets after the first send there."""
+def sample_reflection(types: Any, meeting: SurfaceMeeting, rng: Any) -> tuple[ScatteringEvent, Any]:
+    """Scatter until the light leaves the interface; its weight is 0 where that is by refraction."""
+    # Reflect once where the interface is smooth or diffuse
+    once = events.sample_reflection(meeting, rng.next_float32(), rng.next_float32())
+    surface = meeting.layers.surface(meeting.j)
+    if meeting.layers.base == "diffuse":
+        return once, rng
+    rough = surface.smooth ^ True
+    # Scatter between the facets elsewhere
+    colour = types.Float(1) + 0.0 * meeting.shares(1.0)[0]
+    flight = _fly(types, meeting, colour, rng, rough, [])
+    wo = ops.select_record(flight.outside, surface.out_of(flight.w), once.wo)
+    # Weigh by what single events would do, here and back
+    there = events.evaluate(meeting, wo, True)
+    turned = replace(there, density=there.certain, density_back=there.reverse, reverse=there.density)
+    many = _weighed(turned, ops.select(flight.outside, flight.weight, 0.0))
+    return ops.select_record(rough, many, once), flight.rng
+
+
+def _fly(
+    types: Any,
+    meeting: SurfaceMeeting,
+    carried: Value,
+    rng: Any,
+    active: Value,
+    targets: Sequence[Direction],
+) -> Flight:
+    """Follow light from facet to facet; `targets` are directions away from the surface, up or down, and gathered is
+    what facets after the first send there."""
     import drjit as dr
 
     surface, colour = meeting.layers.surface(meeting.j), carried * 0
@@ -101,7 +131,15 @@ def _fly(types: Any, meeting: SurfaceMeeting, carried: Value, rng: Any, active: 
     start = surface.into((-meeting.wi[0], -meeting.wi[1], -meeting.wi[2]))
     light = meeting.light and meeting.light.seen_by(surface.into)
     flight = Flight(
-        rng, start, types.Float(1), types.Bool(True), colour + 1, colour, types.UInt32(0), types.Bool(active), light
+        rng,
+        start,
+        types.Float(1),
+        types.Bool(True),
+        colour + 1,
+        [colour] * len(targets),
+        types.UInt32(0),
+        types.Bool(active),
+        light,
     )
 
     def step(f: Flight) -> tuple[Flight]:
@@ -109,10 +147,11 @@ def _fly(types: Any, meeting: SurfaceMeeting, carried: Value, rng: Any, active: 
         f.rank = microsurface.fly(f.w, f.rank, *alpha, f.rng.next_float32())
         f.alive &= f.rank <= 1
         i = _reverse(f.w)
-        # Send light to the target
-        goal = ops.select_record(f.outside, target, _reverse(target))
+        # Send light to the targets
         again = f.alive & (f.count > 0)
-        f.value = ops.select(again, f.value + f.weight * _value(meeting, f, i, goal), f.value)
+        for k, target in enumerate(targets):
+            goal = ops.select_record(f.outside, target, _reverse(target))
+            f.values[k] = ops.select(again, f.values[k] + f.weight * _value(meeting, f, i, goal), f.values[k])
         # Meet a facet
         h = ggx.sample_visible(i, *alpha, f.rng.next_float32(), f.rng.next_float32())
         sides = _sides(meeting, f.outside)

@@ -217,8 +217,9 @@ class WalkedPoint:
         begin, end = dr.select(turned, wo, wi), dr.select(turned, wi, wo)
         flipped = end.z < 0
         layers = stack.layers(si, active, flipped)
-        out, rng = way_out(mi, layers, (end.x, end.y, dr.abs(end.z)), rng)
         seen = (begin.x, begin.y, dr.select(flipped, -begin.z, begin.z))
+        turns = seen[2] > 0 if either else False
+        out, rng = way_out(mi, layers, (end.x, end.y, dr.abs(end.z)), rng, turns)
         one = layers.start(mi.UnpolarizedSpectrum(1))
         path = walk(mi, layers, seen, rng, one, active, stack.settings.max_depth, out, self._painted, either_end=either)
         value = layers.seen(path.value, mi.UnpolarizedSpectrum)

@@ -18,10 +18,18 @@ from velatura.optics.phase import deflect
 from velatura.optics.polarisation import Polarisation, unpolarised
 from velatura.reference import events, facets
 from velatura.reference.events import SurfaceMeeting
-from velatura.reference.facets import UP
 from velatura.reference.layers import WalkedLayers, pick
 from velatura.reference.metal import is_colour, mean
-from velatura.reference.next_event import WayOut, connect_medium, connect_surface, way_up
+from velatura.reference.next_event import (
+    WayOut,
+    connect_back,
+    connect_medium,
+    connect_medium_back,
+    connect_surface,
+    on_the_way,
+    way_down,
+    way_up,
+)
 
 ROULETTE = 0.25  # a path that carries less than this survives by chance, and carries this then
 
@@ -34,8 +42,8 @@ class Path:
     `value` are colours. `smooth`: only smooth surfaces were met so far; `painted`: the diffuse base was among them.
     `density` and `chain` weigh the strategies of `next_event`, where `value` comes from. So do `backward` and
     `straight` those of paths from the other end, None where there are none: over the density of what was drawn, the sum
-    of theirs, and while all events were refractions that of refractions without a choice. `light` is the polarisation
-    along `w`, None where it is left out.
+    of theirs, and while a way could have drawn all events its density. `light` is the polarisation along `w`, None
+    where it is left out.
     """
 
     rng: Any
@@ -137,31 +145,39 @@ def _scatter(types: Any, layers: WalkedLayers, path: Path, out: WayOut | None, p
     light = path.light and path.light.mirrored(down ^ True)
     meeting = SurfaceMeeting(layers, j, pick(layers.index, path.slab), pick(layers.index, beyond), wi, down, light)
     u1, u2, u3 = (path.rng.next_float32() for _ in range(3))
-    target = way_up(out, j, down) if out is not None else UP
+    targets = [] if out is None else [(way_up(out, j, down), down)]
+    if out is not None and out.back:
+        targets.append((way_down(out, j, down), down ^ True))
     if layers.microsurface:
         active = path.alive & (path.inside ^ True)
-        onward, towards, path.rng = facets.scatter(types, meeting, path.weight, path.rng, active, target, down)
+        onward, towards, path.rng = facets.scatter(types, meeting, path.weight, path.rng, active, targets)
     else:
         onward = events.sample(meeting, path.weight, u1, u2, u3)
-        towards = events.evaluate(meeting, target, down)
+        towards = [events.evaluate(meeting, *target) for target in targets]
     rough = layers.surface(j).smooth ^ True
     if layers.base == "diffuse":
         path.painted |= layers.is_base(j) & (path.inside ^ True)
     # Gather what leaves from here
     if out is not None:
-        gathered = connect_surface(meeting, towards, out, path, down)
+        gathered = connect_surface(meeting, towards[0], out, path, down)
         if layers.scatters:
             gathered = ops.select(path.inside, connect_medium(layers, out, path), gathered)
         kept = True if painted is None else path.painted ^ (not painted)
         path.value += ops.select(kept, path.weight * gathered, 0.0)
+    if out is not None and out.back and (painted is not False or layers.base != "diffuse"):
+        gathered = connect_back(meeting, towards[1], out, path, down)
+        if layers.scatters:
+            gathered = ops.select(path.inside, connect_medium_back(layers, out, path), gathered)
+        path.value += path.weight * gathered
     # Turn
     z = onward.wo[2]
     turned: Direction = (onward.wo[0], onward.wo[1], ops.select(down, z, -z))
     light = onward.light and onward.light.mirrored(down ^ True)
+    drawn = on_the_way(layers, out, j, onward.reflected, down)
     chain = ops.select(rough, types.Float(1), 0)
-    chain += ops.select(onward.reflected, 0.0, ops.divide(onward.density_back, path.density) * path.chain)
+    chain += ops.select(drawn, ops.divide(onward.density_back, path.density) * path.chain, 0.0)
     weight, density, reverse = onward.weight, onward.density, onward.reverse
-    certain = ops.select(onward.reflected, 0.0, onward.certain)
+    certain = ops.select(drawn, onward.certain, 0.0)
     slab = ops.select(onward.reflected, path.slab, beyond)
     if layers.scatters:
         phase = layers.slab(path.slab).phase
