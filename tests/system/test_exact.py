@@ -94,6 +94,12 @@ def test_a_single_interface_has_no_noise() -> None:
     assert np.allclose(value, np.array(other), rtol=1e-4)
 
 
+def test_samples_reach_directions_that_the_model_has_no_light_in() -> None:
+    bsdf, si = made([Interface(eta=0.2, k=3.9, alpha=0.01)]), exact.interactions(mi, direction(0.7), 1000)
+    wo = mi.warp.square_to_uniform_hemisphere(mi.Point2f(mi.PCG32(1000).next_float32(), 0.7))
+    assert np.all(np.array(bsdf.pdf(mi.BSDFContext(), si, wo)) >= 0.019 * np.array(wo.z) / np.pi)
+
+
 def test_components_add_up() -> None:
     """Light of the base, and all other reflected light, of the same walks."""
     bsdf, si = made(PAINT), exact.interactions(mi, direction(0.7), 1000)

@@ -18,6 +18,7 @@ from velatura.reference.layers import MATCHED
 from velatura.reference.plugin import Settings, WalkedPoint, WalkedStack
 
 _MAX_DEPTH = 1000
+_SPREAD = 0.02  # share of samples that are drawn by the cosine, for light where the model has hardly any
 
 #: Laws of `velatura.checks` that walks do not keep, and this does, since its samples are those of the model; and those
 #: that it does not. It is reciprocal, but few pairs of directions have most of its noise, which is far from normal.
@@ -26,7 +27,7 @@ NOT_KEPT = frozenset({"spread", "reciprocity"})
 
 
 class ExactStack(LayeredStack):
-    """One stack: sampled by a model, evaluated by walks.
+    """One stack: sampled by a model, and seldom by the cosine; evaluated by walks.
 
     Wholly smooth, uniform stacks are those of the model, which is exact there. Other interfaces are at least as rough
     as the model has them.
@@ -86,23 +87,38 @@ class ExactPoint(PointBSDF):
 
         mi, kinds, wi = self.stack.mi, self.stack.kinds, self.walked.si.wi
         bs = dr.zeros(mi.BSDFSample3f)
-        drawn, bs.eta = self.body.sample(tuple(wi), sample1, sample2.x, sample2.y, self.asked)
-        bs.wo = mi.Vector3f(*drawn)
+        # By the model
+        rest = dr.maximum(sample1 - _SPREAD, 0) / (1 - _SPREAD)
+        drawn, eta = self.body.sample(tuple(wi), rest, sample2.x, sample2.y, self.asked)
+        # Or by the cosine, on the sides that are asked for
+        spread, through = sample1 < _SPREAD, sample1 < _SPREAD * self._through
+        wo = mi.warp.square_to_cosine_hemisphere(sample2)
+        wo.z = dr.select(through ^ (wi.z < 0), -wo.z, wo.z)
+        bs.wo = dr.select(spread, wo, mi.Vector3f(*drawn))
+        bs.eta = dr.select(spread, dr.select(through, self.walked.eta, 1) if self.asked.transmission else 1, eta)
         first = next((k for k, kind in enumerate(kinds) if self.walked.asked[kind]), 0)
         passed = wi.z * bs.wo.z < 0
         bs.sampled_component = dr.select(passed, mi.UInt32(len(kinds) - 1), mi.UInt32(first))
         bs.sampled_type = dr.select(passed, mi.UInt32(+kinds[-1]), mi.UInt32(+kinds[first]))
         return bs, None
 
+    @property
+    def _through(self) -> float:
+        """Chance that a sample by the cosine passes."""
+        return self.asked.transmission / max(self.asked.transmission + bool(self.asked.reflection), 1)
+
     def eval_pdf(self, wo: Any, active: Any) -> tuple[Any, Any]:
         import drjit as dr
 
         mi, wi = self.stack.mi, self.walked.si.wi
         of_model, pdf = self.body.eval_pdf(tuple(wi), tuple(wo), self.asked)
+        to_side = dr.select(wi.z * wo.z < 0, self._through, 1 - self._through)
+        pdf = (1 - _SPREAD) * pdf + _SPREAD * to_side * dr.abs(wo.z) / dr.pi
+        lit = active & (self.stack.transmits | (wi.z > 0))
         with dr.suspend_grad():
             value = self.walked.eval(wo, active)
         # No gradient passes the loop of a walk
         of_model = mi.depolarizer(spectral.carried(mi, of_model)) & active
         if dr.grad_enabled(of_model):
             value = of_model + dr.detach(value - of_model)
-        return value, dr.select(active, pdf, 0)
+        return value, dr.select(lit, pdf, 0)

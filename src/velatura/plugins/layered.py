@@ -56,8 +56,9 @@ def make(mi: Any) -> type:
             exterior (number, default 1): absolute index above.
             model (string, default velatura): one of `velatura.MODELS`.
             reflectance, tir, map, scale, medium, form, fetch, lobes (strings): switches of the model. The form may also
-                be `exact`: directions are drawn by the model, with its density, and values are unbiased estimates of
-                the random walk, by which pictures converge to the truth. Gradients are those of the model's values.
+                be `exact`: directions are drawn by the model, with its density, a few by the cosine, and values are
+                unbiased estimates of the random walk, by which pictures converge to the truth. Gradients are those of
+                the model's values.
 
         One reflected lobe per interface, over a diffuse base if there is one. A stack that ends in a dielectric
         transmits one lobe more, and is lit from both sides; the index above is `exterior`, that below is the last one,

@@ -179,6 +179,12 @@ class WalkedPoint:
     asked: dict[Any, bool]
     radiance: bool
 
+    @property
+    def eta(self) -> Any:
+        """Index on the other side, over that on the side of the direction."""
+        layers = self.stack.layers(self.si, True, self.si.wi.z < 0)
+        return self.stack.mi.Float(relative_index(layers.index[0], layers.index[-1]))
+
     def draw(self, sample1: Any, sample2: Any, active: Any) -> tuple[Any, Any]:
         import drjit as dr
 
