@@ -20,15 +20,14 @@ from velatura.model.variance import Isotropic
 from velatura.shader import prefiltered, shader
 from velatura.shader.closures import shares
 from velatura.shader.material import title
-from velatura.shader.prefiltered import Prefiltered
+from velatura.shader.prefiltered import ROUND, Prefiltered
 from velatura.shader.printers.glsl import Glsl
 from velatura.shader.program import described
 from velatura.shader.recorder import recording
 from velatura.stack import Material, Varying
 
 MOST_TAPS = 9  # along the longer axis of a part
-DENSITY = 2.4  # taps in a width of the blur
-ROUND = 0.3  # elongation, up to which one tap serves
+DENSITY = 3.4  # taps in a width of the blur
 
 
 class Environment(NamedTuple):
@@ -90,11 +89,12 @@ def environment(request: Request) -> Environment:
 def _part_lines(share: float, found: Prefiltered, first: int) -> Iterator[str]:
     """Statements that add up the parts of a stack whose lines begin at a number."""
     cosines, turns = (*found.shape, 1)[:2]
-    sides, _, parts, _ = found.rows.shape
+    sides, _, parts, numbers = found.rows.shape
+    texels = numbers // 4
     for k, (passes, longer) in enumerate(zip(found.passes, found.elongation)):
         taps = min(1 + 2 * int(np.ceil(0.5 * DENSITY * longer)), MOST_TAPS) if longer > ROUND else 1
-        side, above = "-side" if passes else "side", first + 2 * k * turns
-        line = f"side < 0.0 ? {above + 2 * parts * turns} : {above}" if sides > 1 else f"{above}"
+        side, above = "-side" if passes else "side", first + texels * k * turns
+        line = f"side < 0.0 ? {above + texels * parts * turns} : {above}" if sides > 1 else f"{above}"
         where = "" if sides > 1 else "if (side > 0.0) "
         yield f"    {where}sum += {share:.6f} * vt_part({line}, ivec2({cosines}, {turns}), wi, {side}, {taps});"
 
@@ -116,7 +116,7 @@ def _string(text: str) -> str:
 
 
 _ENVIRONMENT = """\
-// The material's parts by the environment: of each its energy and root of alpha, and where it leaves
+// The material's parts by the environment: of each its energy, where it leaves, root of alpha, and shape
 uniform highp sampler2D vt_parts;
 
 vec4 vt_part_node(int line, int x, int y) {{ return texelFetch(vt_parts, ivec2(x, line + y), 0); }}
@@ -136,6 +136,7 @@ vec3 vt_part(int line, ivec2 nodes, vec3 wi, float side, int taps) {{
     float along = twice.x / (abs(twice.x) + abs(twice.y));
     vec2 place = vec2(sqrt(abs(wi.z)), 0.25 * (twice.y < 0.0 ? 3.0 + along : 1.0 - along));
     vec4 a = vt_part_line(line, nodes, place), b = vt_part_line(line + nodes.y, nodes, place);
+    vec4 shape = vt_part_line(line + 2 * nodes.y, nodes, place);
 
     // The mean direction, and tangents about it (Duff et al. 2017)
     float sine = length(wi.xy);
@@ -147,7 +148,9 @@ vec3 vt_part(int line, ivec2 nodes, vec3 wi, float side, int taps) {{
     // The longer axis
     float more = length(b.zw), cosine = more > 0.0 ? b.z / more : 1.0;
     vec2 turn = sqrt(max(0.5 + 0.5 * vec2(cosine, -cosine), vec2(0.0)));
-    vec3 axis = sqrt(more) * (turn.x * x + (b.w < 0.0 ? -turn.y : turn.y) * y);
+    if (b.w < 0.0) turn.y = -turn.y;
+    vec3 axis = turn.x * x + turn.y * y;
+    float skew = dot(shape.xy, turn) / 6.0, growth = dot(shape.zw, turn);
 
     // From the plane of incidence
     vec2 plane = sine > 1e-6 ? wi.xy / sine : vec2(1.0, 0.0);
@@ -157,10 +160,14 @@ vec3 vt_part(int line, ivec2 nodes, vec3 wi, float side, int taps) {{
     vec3 sum = vec3(0.0);
     float whole = 0.0;
     for (int k = 0; k < taps; k++) {{
-        float at = taps > 1 ? 4.2 * float(k) / float(taps - 1) - 2.1 : 0.0, share = exp(-0.45 * at * at);
-        vec3 tap = normalize(w + at * axis);
+        // Places by a gamma distribution (Wilson and Hilferty 1931)
+        float normal = taps > 1 ? 4.2 * float(k) / float(taps - 1) - 2.1 : 0.0, share = exp(-0.45 * normal * normal);
+        float h = skew * (taps > 1 ? normal - skew : 0.0), at = (normal - skew) * (1.0 + h + h * h / 3.0);
+        float p = taps > 1 ? clamp(sqrt(more) * at, -0.99, 0.99) : 0.0;
+        vec3 tap = sqrt(1.0 - p * p) * w + p * axis;
         tap.z = side * max(side * tap.z, 0.0);
-        sum += share * vt_blurred(normalize(tap), b.y);
+        float wider = taps > 1 ? sqrt(sqrt(clamp(1.0 + growth * at, 0.06, 16.0))) : 1.0;
+        sum += share * vt_blurred(normalize(tap), min(b.y * wider, 1.0));
         whole += share;
     }}
     return a.rgb * sum / whole;

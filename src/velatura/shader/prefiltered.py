@@ -1,10 +1,11 @@
 """The light of a material by prefiltered environments: for light from each direction, every part's energy, the mean
-direction in which it leaves, and its width.
+direction in which it leaves, its width, and its skewness.
 
 An engine blurs its environment by a GGX lobe seen along the normal (Karis 2013), of roughness alpha
 (`kernel_variance`). A part of the model is then that blur about its own mean direction. It takes the alpha by which the
-blur is as wide as the part is across its axis of least width; along the other axis several blurs lie side by side.
-Widths are second moments on the sphere, which are finite for GGX.
+blur is as wide as the part is across its axis of least width; along the other axis several blurs lie side by side, of
+which those on one side are nearer to each other and narrower, as third moments ask. Widths are second moments on the
+sphere, which are finite for GGX.
 """
 
 from __future__ import annotations
@@ -33,17 +34,20 @@ LINE, PLANE = (64,), (32, 17)  # nodes over the cosine, and the azimuth where an
 COS_MIN, COS_MAX = 0.02, 1 - 1e-6  # of directions at nodes, which all have an azimuth
 SAMPLES = 1024  # of a part at a node
 FAINT = 1e-4  # energy, below which a part is left out
+ROUND = 0.3  # elongation, up to which one blur serves
+MOST_SKEW, MOST_GROWTH = 2.0, 2.0  # of the blurs along the longer axis
 ALPHAS = np.concatenate([[0.0], np.geomspace(ALPHA_MIN, 1.0, 100)])
 
 
 @dataclass(frozen=True)
 class Prefiltered:
-    """Parts over direction, from above and, where the material transmits, from below: `rows` (sides, nodes, parts, 8).
+    """Parts over direction, from above and, where the material transmits, from below: `rows` (sides, nodes, parts, 12).
 
     Of each part: energy, a colour; the mean direction across the normal, in the plane of incidence and beside it, over
     the sine of the direction of light; the root of alpha; and the variance that the longer axis has beyond the shorter,
-    times cosine and sine of twice its angle from the first of the `tangents`. `passes` says which parts leave on the
-    other side.
+    times cosine and sine of twice its angle from the first of the `tangents`. Then vectors along that axis, in those
+    tangents: the skewness of the blurs' places, and the growth of a blur's variance with its place, both in units of
+    the root of that variance. `passes` says which parts leave on the other side.
     """
 
     rows: Array
@@ -55,7 +59,7 @@ class Prefiltered:
         """Greatest spread along the longer axis over the width of the blur, of each part; (parts,)."""
         roughness, more = self.rows[..., 5], np.hypot(self.rows[..., 6], self.rows[..., 7])
         bright = self.rows[..., :3].max(axis=-1) > 0.1 * self.rows[..., :3].max()
-        ratio = np.sqrt(more / np.interp(roughness**2, ALPHAS, VARIANCES))
+        ratio = np.sqrt(more / np.maximum(np.interp(roughness**2, ALPHAS, VARIANCES), VARIANCES[1]))
         return np.asarray(np.where(bright, ratio, 0).max(axis=(0, 1)))
 
 
@@ -93,7 +97,7 @@ def prefiltered(material: Material, model: Model) -> Prefiltered:
 
 
 def _moments(body: Body, wi: Direction, asked: Query) -> Array:
-    """Energy, mean direction and widths of a part at directions (N,): (N, 8)."""
+    """The numbers of a part at directions (N,): (N, 12)."""
     nodes = len(wi[0])
     u = at_nodes(nodes, SAMPLES)
     repeat = tuple(repeated(x, SAMPLES) for x in wi)
@@ -122,7 +126,19 @@ def _moments(body: Body, wi: Direction, asked: Query) -> Array:
     radius = np.hypot(half, cross)
     least = np.maximum(0.5 * (xx + yy) - radius, 0)
     alpha = np.interp(least, VARIANCES, ALPHAS)
-    return np.stack([*energy, mean[0] / sine, mean[1] / sine, np.sqrt(alpha), 2 * half, 2 * cross], axis=-1)
+
+    # Third moments: a blur whose variance grows along the axis gives three times what it takes across it
+    angle = 0.5 * np.arctan2(cross, half)
+    axis = np.array([np.cos(angle), np.sin(angle)])
+    a = axis[0][:, None] * along[0] + axis[1][:, None] * along[1]
+    b = axis[0][:, None] * along[1] - axis[1][:, None] * along[0]
+    aaa, abb = (share * a**3).sum(axis=-1), (share * a * b * b).sum(axis=-1)
+    blur = np.maximum(np.interp(alpha, ALPHAS, VARIANCES), 1e-12)
+    beyond = np.sqrt(np.maximum(2 * radius, ROUND**2 * blur))
+    skewness = np.clip((aaa - 3 * abb) / beyond**3, -MOST_SKEW, MOST_SKEW)
+    growth = np.clip(abb / (blur * beyond), -MOST_GROWTH, MOST_GROWTH)
+    shape = [*(skewness * axis), *(growth * axis)]
+    return np.stack([*energy, mean[0] / sine, mean[1] / sine, np.sqrt(alpha), 2 * half, 2 * cross, *shape], axis=-1)
 
 
 def texture(found: Prefiltered) -> Array:
