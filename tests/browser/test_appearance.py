@@ -23,6 +23,7 @@ from editor import Server, Tabs, Visit, unexpected
 import velatura as vt
 from velatura.editor import appearance
 from velatura.inverse import invert
+from velatura.inverse.wishes.wish import compared, reflected
 from velatura.scenes.objects import OBJECTS
 
 pytestmark = pytest.mark.skipif(bool(chromium.missing()), reason=chromium.missing())
@@ -695,3 +696,17 @@ def test_further_wishes_are_dragged(visit: Open) -> None:
     thickness = page.state("layers.0.keys.films.0.thickness_nm")
     drag(look.get_by_label("Film, by its thickness: share, slider"), (round(0.3 * most), round(0.4 * most)))
     assert page.state("layers.0.keys.films.0.thickness_nm") != pytest.approx(thickness, abs=1)
+
+    # A mixture, by its weights; its parts are wished for one at a time
+    look = further("Half-metallic paint")
+    page.settled()
+    pigment = page.state("parts.1.layers.2.keys.albedo")
+    drag(look.get_by_label("Mixture, by its weights: share, slider"), (round(0.1 * most), round(0.2 * most)))
+    shares = np.linspace(0, 1, 101)
+    paints = [vt.preset("half-metallic-paint").replace(part0_weight=float(share)) for share in (0, 0.5, 1)]
+    flakeless, before, flaky = (reflected(vt.lobes(each, 1.0, model="weier2020"))[:, 0] for each in paints)
+    asked = compared(before * 0.2 / before.mean(), None)
+    missed = [np.linalg.norm(compared(share * flaky + (1 - share) * flakeless, None) - asked) for share in shares]
+    assert page.state("parts.0.weight") == pytest.approx(shares[np.argmin(missed)], abs=0.01)
+    assert page.state("parts.1.layers.2.keys.albedo") == pigment
+    look.get_by_text("No weights of these parts give").wait_for()

@@ -55,6 +55,12 @@ test('code depends on masks, and neither on shares nor on what is chosen', () =>
   assert.notEqual(of(parts.setWeight, idOf(state, 'dust'), 0.1), pattern(state));
 });
 
+test('weights of another mixture are taken by its parts, and those within them stay', () => {
+  const state = opened(NESTED), other = documentOf(parts.setWeight(state, idOf(state, 'dust'), 0.25));
+  assert.deepEqual(documentOf(parts.setWeights(state, other)), other);
+  assert.deepEqual(documentOf(parts.setWeights(parts.choosePart(state, idOf(state, 'rust')), other)), other);
+});
+
 test('a share ends where the others leave nothing', () => {
   const state = opened(NESTED), weights = (next) => documentOf(next).mix[1].material.mix.map(({ weight }) => weight);
   assert.deepEqual(weights(parts.setWeight(state, idOf(state, 'rust'), 0.9)), [0.25, 0.75, undefined]);

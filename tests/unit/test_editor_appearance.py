@@ -804,6 +804,19 @@ def test_a_drag_of_lobes_takes_no_other_wish() -> None:
             VERBS[verb]({"target": target, "lobe": 0})
 
 
+def test_a_mixture_is_asked_for_its_colour_alone() -> None:
+    """Expected: the answer of the library; the weight is that of two chalks, whose light adds up."""
+    chalks = [{"layers": [{"diffuse": {"albedo": albedo}}]} for albedo in (0.8, 0.2)]
+    mix = {"mix": [{"weight": 0.5, "material": chalks[0]}, {"material": chalks[1]}]}
+    (shown,) = VERBS["wishes"]({"material": mix})["wishes"]
+    assert shown["key"] == "mixture" and shown["energy"] == pytest.approx([0.5] * 3, abs=1e-4)
+    answer = VERBS["wish"]({"material": mix, "target": {"mixture": {"energy": 0.35}}, "coarse": True})
+    assert answer["snapped"] is None and answer["wishes"][0]["energy"] == pytest.approx([0.35] * 3, abs=1e-3)
+    assert answer["material"]["mix"][0]["weight"] == pytest.approx(0.25, abs=1e-3)
+    with pytest.raises(InvalidInput, match="the inverse takes a single stack, not a mixture, of which only mixture"):
+        VERBS["wish"]({"material": mix, "target": {"body": {"energy": 0.35}}})
+
+
 def test_a_material_states_what_it_lacks_for_a_wish() -> None:
     """Expected: for a clear pane its haze, and a medium; the way adds what is lacking, which is no more after it."""
     pane = {"layers": [{"interface": {"eta": 1.5, "alpha": 0.1}}, {"interface": {"eta": 1.0}}]}

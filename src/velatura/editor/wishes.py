@@ -6,24 +6,27 @@ from typing import Any
 
 import numpy as np
 
-from velatura.editor.messages import Answer, Body, Verb, document, field, model_of, stack_of
+from velatura.editor.messages import Answer, Body, Verb, document, field, material_of, model_of
 from velatura.inverse import Infeasible, Target
 from velatura.inverse.answer import nearest_answers, refused
-from velatura.inverse.wishes import KINDS
+from velatura.inverse.wishes import KINDS, MixtureColour
 from velatura.model import Model
 from velatura.model.registry import stack_lobes
-from velatura.stack import Stack
+from velatura.stack import Described, Mix
 
 ANGLE = 75.0  # of the second look
 TILTED, BLURRED = "grazing", "passed"  # seen at that angle, and with a blur that needs no absorption
 
 
 def wishes(body: Body) -> Answer:
-    """Every wish that a material may be asked for: what it shows of it, or what it lacks for it."""
-    return {"wishes": _shown(stack_of(body, "appearance"), model_of(body), body.get("angle", ANGLE))}
+    """Every wish that a material may be asked for, of a mixture its colour: what it shows of it, or what it lacks."""
+    return {"wishes": _shown(material_of(body), model_of(body), body.get("angle", ANGLE))}
 
 
-def _shown(stack: Stack, model: Model, angle: float) -> list[Answer]:
+def _shown(stack: Described, model: Model, angle: float) -> list[Answer]:
+    if isinstance(stack, Mix):
+        own = MixtureColour(energy=0.5).of(stack, model)
+        return [{"key": MixtureColour.key, "energy": np.clip(own, 0.0, 1.0).tolist()}]
     seen, found = stack_lobes(stack, np.cos(np.radians([0.0, angle])), model=model), list[Answer]()
     groups = [[k] for k in range(len(seen.energy))]
     for key, kind in KINDS.items():
@@ -42,8 +45,8 @@ def _shown(stack: Stack, model: Model, angle: float) -> list[Answer]:
 def wish(body: Body) -> Answer:
     """The nearest material to a wish under its key in `target`, from `material`, and what it shows; `snapped`: why the
     wish is not met, or null. A `coarse` one takes fewer readings."""
-    stack, model = stack_of(body, "appearance"), model_of(body)
-    target = Target.from_dict({**field(body, "target", dict), "start": stack})
+    model = model_of(body)
+    target = Target.from_dict({**field(body, "target", dict), "start": material_of(body)})
     try:
         found = nearest_answers(target, 1, model, quick=body.get("coarse", False))[0]
     except Infeasible as error:

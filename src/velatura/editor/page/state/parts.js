@@ -110,6 +110,12 @@ export const setWeight = titled('change the share of a part', (state, id, weight
   }),
 );
 
+/** Gives all parts the weights of another mixture of the same; those of mixtures within it stay. */
+export const setWeights = titled('change the shares of parts', (state, { mix }) => ({
+  ...state,
+  parts: state.parts.map((node, k) => ({ ...node, weight: mix[k].weight ?? null })),
+}));
+
 export const movePart = titled('move a part', (state, id, to) => {
   const siblings = siblingsOf(treeOf(state), id), from = siblings.findIndex((node) => node.id === id);
   const place = Math.max(0, Math.min(siblings.length - 1, to));

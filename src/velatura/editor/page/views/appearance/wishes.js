@@ -1,8 +1,9 @@
-// Wishes beyond lobes: what is reflected at a second angle, what passes, and the colours of a base and of a film.
+// Wishes beyond lobes: what is reflected at a second angle, what passes, and the colours of a base, of a film, and of a mixture.
 
 import { html, nothing } from 'lit-html';
 import { setAppearance } from '../../state/commands.js';
-import { stackOf } from '../../state/material.js';
+import { documentOf, stackOf } from '../../state/material.js';
+import { setWeights } from '../../state/parts.js';
 import { colourRow } from '../colour.js';
 import { capital, number } from '../controls.js';
 import { mean } from '../plots/scale.js';
@@ -17,6 +18,7 @@ const TITLES = {
   film: 'Film, by its thickness',
   mixture: 'Mixture, by its weights',
 };
+const MIXTURE = 'mixture'; // whose parts are looked at one at a time otherwise
 const STEEPEST = { low: 0, high: 89, strict: false };
 const SHARE = { low: 0, high: 1, strict: false };
 const HAZE = { low: 0, high: 0.9995, strict: false };
@@ -29,7 +31,8 @@ const rounded = (value) => Number(value.toPrecision(4));
  * @param {{question: function, ask: function, paint: function}} panel what the panel around knows and does
  */
 export function createWishes({ store, call, edits, messages }, panel) {
-  let read = []; // what the material shows of each wish: {key, energy, haze}, or lacks for it: {lacks, way, material}
+  let read = []; // what the stack shows of each wish: {key, energy, haze}, or lacks for it: {lacks, way, material}
+  let mixed = []; // the same of the mixture that it is a part of
   let text = ''; // what was asked about
   let angle = 75;
   let origin = null; // material that the wishes of a step start from
@@ -38,31 +41,51 @@ export function createWishes({ store, call, edits, messages }, panel) {
   let held = false;
   let rough = null; // wish whose answer is approximate
 
-  const textNow = () => JSON.stringify({ ...panel.question(), angle });
+  const question = () => ({ ...panel.question(), angle });
+  const textNow = () => JSON.stringify([question(), store.get().parts && documentOf(store.get())]);
 
   /** Reads the material anew where it is another one. */
   async function follow() {
     if (held || wishes.busy || textNow() === text) return;
     const own = textNow();
     [text, asked, refused] = [own, null, null];
+    const found = await shownBy(stackOf(store.get()));
+    if (!found || own !== text) return;
+    [read, mixed] = [found, []];
+    panel.paint();
+    if (store.get().parts) await readMixture();
+  }
+
+  /**
+   * The wishes that a material may be asked for: none where its lobes cannot be read, for which the panel has the reason; null
+   * where a later question took the place of this one.
+   */
+  async function shownBy(material) {
     try {
-      const answer = await panel.ask('wishes', { ...panel.question(), angle });
-      if (answer && own === text) read = answer.wishes;
+      const answer = await panel.ask('wishes', { ...question(), material });
+      return answer && answer.wishes;
     } catch {
-      if (own === text) read = []; // the panel says why it has no lobes
+      return [];
     }
+  }
+
+  async function readMixture() {
+    const own = text;
+    const found = await shownBy(documentOf(store.get()));
+    if (!found || own !== text || held) return;
+    mixed = found;
     panel.paint();
   }
 
   const wishes = oneAtATime(
     async (wanted) => {
       const coarse = held;
-      const body = { ...panel.question(), material: origin, target: { [wanted.key]: wanted.wish }, angle, coarse };
+      const body = { ...question(), material: origin, target: { [wanted.key]: wanted.wish }, coarse };
       try {
         const answer = (await panel.ask('wish', body)) ?? (held ? null : await call('wish', body)); // what rests is answered
         if (!answer) return;
         rough = coarse ? wanted : null;
-        accept(answer);
+        accept(answer, wanted.key);
         messages.forgive('appearance');
       } catch (error) {
         messages.fail('appearance', error);
@@ -71,11 +94,12 @@ export function createWishes({ store, call, edits, messages }, panel) {
     () => held || comeToRest(),
   );
 
-  function accept({ material, wishes: shown, snapped, why }) {
+  function accept({ material, wishes: shown, snapped, why }, key) {
     refused = snapped ?? why ?? null;
     if (material) {
-      read = shown;
-      edits.drag('appearance', setAppearance, material);
+      if (key === MIXTURE) mixed = shown;
+      else read = shown;
+      edits.drag('appearance', key === MIXTURE ? setWeights : setAppearance, material);
       text = textNow();
     }
     panel.paint();
@@ -88,6 +112,7 @@ export function createWishes({ store, call, edits, messages }, panel) {
       rough = null;
       return wishes.want(wanted);
     }
+    if (mixed.length && asked?.key !== MIXTURE) readMixture();
     if (!refused) asked = null;
     origin = null;
     edits.settle();
@@ -96,7 +121,8 @@ export function createWishes({ store, call, edits, messages }, panel) {
 
   /** Requests changes of a wish; those that the same drag has asked for remain. */
   function want(key, changes) {
-    origin ??= stackOf(store.get());
+    if (asked?.key !== key) origin = null;
+    origin ??= (key === MIXTURE ? documentOf : stackOf)(store.get());
     const before = asked?.key === key ? asked.wish : key === 'grazing' ? { angle } : {};
     asked = { key, wish: { ...before, ...changes } };
     held = true;
@@ -156,10 +182,10 @@ export function createWishes({ store, call, edits, messages }, panel) {
   return {
     follow,
     view: () =>
-      read.length
+      read.length + mixed.length
         ? html`<details class="part further">
             <summary>Further wishes</summary>
-            ${read.map(row)}
+            ${[...mixed, ...read].map(row)}
           </details>`
         : nothing,
     get busy() {
