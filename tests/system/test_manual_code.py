@@ -33,7 +33,7 @@ from velatura.cli import app
 from velatura.comparison import evaluated_lobes, pictures, plugins
 from velatura.editor import server
 from velatura.errors import Incomplete
-from velatura.inverse import wishes
+from velatura.inverse.lobes.target import FURTHER
 from velatura.programs import fit
 from velatura.shader import closures
 from velatura.sweeps import run as sweeping
@@ -117,7 +117,7 @@ def files_of_readme(folder: Path) -> None:
 
 
 def files_of_inverse(folder: Path) -> None:
-    further = "pane.yaml", "bright-edge.yaml", "flakes.yaml", "workshop.yaml"
+    further = "pane.yaml", "bright-edge.yaml", "flakes.yaml", "workshop.yaml", "lacquered.yaml"
     names = "target.yaml", None, *further, "metal.yaml", "blue-over-red.yaml"
     for name, text in zip(names, written("docs/how-to/inverse.md", "yaml")):
         if name:
@@ -282,7 +282,7 @@ def parse(text: str, folder: Path) -> None:
     path = folder / (named[1] if named else "block.yaml")
     path.write_text(text if not text.startswith("-") else f"layers:\n{text}")
     keys = yaml.safe_load(path.read_text()).keys()
-    if keys & {"lobes", *wishes.KINDS}:
+    if keys & {"lobes", *FURTHER}:
         inverse.load_target(path)
     elif "vary" in keys:
         sweeps.load_plan(path)

@@ -28,6 +28,7 @@ COATED = Stack([Interface(eta=1.5, alpha=0.1), Medium(sigma_a=0.1), Interface(et
 OXIDE = Stack([Interface(eta=(2.7, 2.5, 2.2), k=(3.8, 3.4, 3.0), films=(Film(eta=2.4, thickness_nm=50.0),))])
 RED, BLUE = (Stack([Diffuse(albedo=albedo)]) for albedo in ((0.8, 0.1, 0.1), (0.1, 0.2, 0.6)))
 DUST = Mix([(0.5, Stack([Interface(eta=1.5), Diffuse(albedo=0.1)])), (None, Stack([Diffuse(albedo=0.6)]))])
+PIGMENTED = Stack([PANE.layers[0], Medium(pigments=[{"K": 0.1, "S": 0.2, "concentration": 0.5}]), PANE.layers[2]])
 PAIR = [{"energy": 0.15, "alpha": 0.1, "interfaces": 2}]
 
 #: A wish that can be met of each kind, and the keys of values that may change for it.
@@ -190,10 +191,18 @@ def test_what_cannot_be_is_refused_with_a_way_out_that_can(wish: dict[str, Any],
             {"start": OXIDE, "film": {"energy": 0.5, "thinnest_nm": 2000.0}},
             "film: thickest_nm: must be above thinnest_nm",
         ),
-        ({"lobes": PAIR, "available": []}, "available: must be a list of 24 indices or names of substances at most"),
+        ({"lobes": PAIR, "available": []}, "available: must be a list of 24 indices, names of substances, or lacqu"),
         ({"lobes": PAIR, "available": ["watr"]}, "available: eta: unknown name 'watr' (did you mean water?)"),
         ({"lobes": PAIR, "available": ["Au"]}, "available: holds no substance for any interface; name dielectrics"),
-        ({"start": PANE, "available": ["water"]}, "available: chooses indices of lobes; write lobes"),
+        ({"available": ["water"]}, "lobes: must hold at least one lobe; without any, write a start"),
+        ({"lobes": PAIR, "available": [{"eta": 1.5}]}, "available: sigma_a: missing"),
+        ({"lobes": PAIR, "available": [True]}, "available: must hold indices, names of substances, or lacquers, got"),
+        ({"lobes": PAIR, "thinnest": -1}, "thinnest: must lie in 0 to 1e9, got -1"),
+        ({"start": PIGMENTED, "thinnest": 2}, "thinnest: layer 1 has a depth of 1, which its pigments need"),
+        (
+            {"start": DUST, "mixture": {"energy": 0.4}, "thinnest": 1},
+            "start: the inverse takes a single stack, not a mix",
+        ),
         ({"start": PANE, "mixture": {"energy": 0.5}}, "mixture: chooses weights; write a start with mix"),
         ({"start": DUST, "body": {"energy": 0.5}}, "start: the inverse takes a single stack, not a mixture, of which"),
         (
@@ -203,7 +212,7 @@ def test_what_cannot_be_is_refused_with_a_way_out_that_can(wish: dict[str, Any],
         ({"start": "pane.yaml", "body": {"energy": 0.5}}, "start: unknown preset 'pane.yaml'"),
         ({"start": PANE, "passed": {"colour": 1}}, "passed: unknown key 'colour'"),
         ({"passed": {"energy": 0.5}}, "lobes: must hold at least one lobe; without any, write a start"),
-        ({}, "lobes: must hold at least one lobe, or grazing, passed, body, film, mixture with a start"),
+        ({}, "lobes: must hold at least one lobe, or grazing, passed, body, film, mixture, available, th"),
     ],
 )
 def test_what_is_no_wish_is_refused_in_one_line(wish: dict[str, Any], words: str) -> None:
@@ -234,10 +243,8 @@ def test_what_is_fixed_above_the_first_lobe_stays() -> None:
 
 def test_pigments_stay_where_something_else_may_change() -> None:
     """Expected: the coat is rougher, and the medium has the pigments that it had."""
-    pigmented = Medium(pigments=[{"K": 0.1, "S": 0.2, "concentration": 0.5}])
-    start = Stack([Interface(eta=1.5, alpha=0.1), pigmented, Interface(eta=1.0, alpha=0.1)])
-    found = answer({"start": start, "passed": {"haze": 0.97}}, "velatura").stack
-    assert found.layers[1] == pigmented
+    found = answer({"start": PIGMENTED, "passed": {"haze": 0.97}}, "velatura").stack
+    assert found.layers[1] == PIGMENTED.layers[1]
     assert found.interfaces[0].alpha > 0.1
 
 
@@ -266,3 +273,36 @@ def test_a_stack_of_available_substances_is_found_by_its_lobes() -> None:
         assert each.stack.interfaces[1].conductor in ("Au", "Cu", "Al")
     pinned = {"lobes": [{**top, "fixed": {"eta": [1.33]}}, wish["lobes"][1]], "available": ["bk7", "Cu"]}
     assert answer(pinned, "bati2021").stack.interfaces[0].eta == pytest.approx(1.33)
+
+
+def test_a_material_is_made_of_what_is_available() -> None:
+    """Expected: the lobes of the present material, as near as its substances come; where it has these, itself."""
+    wish = {"start": COATED, "available": [1.5, "water", "Au"]}
+    near = answer(wish, "bati2021")
+    assert near.stack.interfaces[0].eta == 1.5 and near.stack.interfaces[1].conductor == "Au"
+    assert near.reached.lobes[0].colour == pytest.approx(near.target.lobes[0].colour, rel=1e-3)
+    same = answer({"start": near.stack, "available": [1.5, "Au"]}, "bati2021")
+    assert same.met and [same.stack.flat()[key] for key in ("layer1_sigma_a", "layer2_alpha_u")] == [
+        pytest.approx(near.stack.flat()[key], abs=1e-3) for key in ("layer1_sigma_a", "layer2_alpha_u")
+    ]
+
+
+@pytest.mark.parametrize(("thinnest", "depth"), [(0.0, 2.5), (1.0, 2.5), (4.0, 4.0)])
+def test_a_lacquer_is_laid_as_thick_as_its_colour_asks_for(thinnest: float, depth: float) -> None:
+    """Truth: the stack whose lobes are asked for, with 2.5 of the lacquer; a thicker one is darker."""
+    red = {"eta": 1.5, "sigma_a": (0.02, 0.2, 0.3)}
+    true = Stack([Interface(eta=1.5, alpha=0.1), Medium(depth=2.5, sigma_a=red["sigma_a"]), Interface(conductor="Al")])
+    found = answer({"start": true, "available": [red, "Al"], "thinnest": thinnest}, "bati2021")
+    coat = found.stack.layers[1].flat()
+    assert coat["sigma_a"] == red["sigma_a"] and coat["depth"] == pytest.approx(depth, rel=1e-3)
+    assert found.met == (depth == 2.5)
+
+
+def test_coats_are_at_least_so_thick() -> None:
+    """Expected: media of that depth, clear ones included, with the optical depths that others have without."""
+    free, thick = (answer({"lobes": PAIR, "thinnest": thinnest}, "bati2021") for thinnest in (1e-3, 25.0))
+    thin, coat = (each.stack.layers[1].flat() for each in (free, thick))
+    assert thick.met and coat["depth"] == 25
+    assert np.multiply(coat["sigma_a"], 25) == pytest.approx(np.multiply(thin["sigma_a"], thin["depth"]))
+    before, after = (vt.lobes(each.stack, 1.0, model="bati2021").energy for each in (free, thick))
+    assert np.allclose(before, after, atol=1e-9)

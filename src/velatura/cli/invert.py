@@ -74,7 +74,10 @@ def invert(
     Of the whole: exterior (1), eta_max (4), channels (mean or separate), name;
       start       a material, as a file has it, or a preset's name, with which
                   the search begins
-      available   substances that interfaces may lie above: [water, bk7, 1.6, Au]
+      available   substances that interfaces may lie above: [water, bk7, 1.6, Au],
+                  and lacquers: {eta: 1.5, sigma_a: [0.1, 0.2, 0.9]}
+      thinnest    the least depth of a medium, of lacquers above all
+    Without lobes, both of these ask for those of the start.
 
     Wishes beyond these, of lobes or of a start alone: energy, and angle (degrees):
 

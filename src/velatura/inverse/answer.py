@@ -19,12 +19,12 @@ from velatura.errors import InvalidInput, whole_number
 from velatura.inverse.fitting.free_values import Free, FreeValues
 from velatura.inverse.fitting.simplify import first_stacks, with_media
 from velatura.inverse.invert import alternatives, invert_stack, model_of
-from velatura.inverse.lobes.partial_stack import Array
+from velatura.inverse.lobes.partial_stack import Array, written
 from velatura.inverse.lobes.target import Target, TargetLike, TargetLobe, read
 from velatura.inverse.local.approach import Secants
 from velatura.inverse.reasons import Direction, Infeasible
 from velatura.inverse.wishes import KINDS
-from velatura.inverse.wishes.available import made_of
+from velatura.inverse.wishes.available import filled, laid, made_of
 from velatura.inverse.wishes.mixture import weighed
 from velatura.inverse.wishes.wish import compared
 from velatura.model import DEFAULT, Model
@@ -32,8 +32,9 @@ from velatura.model.lobe_statistics import StackLobes
 from velatura.model.registry import stack_lobes
 from velatura.model.roughness_maps import MAPS
 from velatura.model.variance import Covariance, Roughness
-from velatura.stack import Interface, Medium, Mix, Stack
+from velatura.stack import Interface, Material, Medium, MediumValues, Mix, Stack
 from velatura.stack.io import Loaded
+from velatura.stack.layers import COEFFICIENTS
 
 FIRST = 30.0  # weight of lobes beside other wishes
 WIDTHS, BLURRED = 0.2, 0.02  # weight of variances, relative to themselves and this
@@ -41,7 +42,7 @@ STRIDE = 1e-4  # of coordinates, for slopes
 ENOUGH = 2e-5  # of what is missed, where a search ends
 MISSED = 5e-3  # of what is missed that is worth a word: half a unit of CIE 1976, or .001 of a roughness
 DRAWN, TRIED = 40, 3  # stacks with the lobes that are looked at, and that searches begin with
-INDEX = {"eta", "k"}  # keys that stay where substances are given
+INDEX, ABSORPTION = {"eta", "k"}, {"sigma", "depth"}  # keys that stay where substances are given, or optical depths
 SAME = 1e-3  # relative difference of values that are one answer
 
 
@@ -137,6 +138,7 @@ def nearest_answers(wanted: Target, count: int, model: Model, seed: int = 0, qui
     for wish in wanted.further:
         starts = [other for stack in starts for other in wish.starts(stack)]
     held = _held(wanted, starts[0], model)
+    wanted = held if wanted.available else wanted
     tried = _made_of(held, starts, model) or starts
     tried.sort(key=lambda stack: _Search.of(held, stack, model.surrogate).cost)
     effort, found = QUICK if quick else THOROUGH, list[Answer]()
@@ -155,8 +157,8 @@ def nearest_answers(wanted: Target, count: int, model: Model, seed: int = 0, qui
 def _starts(wanted: Target, count: int, model: Model, seed: int) -> list[Stack]:
     """The present material, or else stacks that have the lobes."""
     if isinstance(wanted.start, Stack):
-        return [wanted.start]
-    alone = wanted.model_copy(update={key: () for key in wanted.beyond_lobes})
+        return [filled(wanted.start) if wanted.available else wanted.start]
+    alone = wanted.model_copy(update={key: Target.model_fields[key].default for key in wanted.beyond_lobes})
     drawn = max(DRAWN, count), model.surrogate, seed
     try:
         found = first_stacks(alone, *drawn) if wanted.nearest else alternatives(alone, *drawn)
@@ -189,17 +191,35 @@ def _made_of(wanted: Target, starts: list[Stack], model: Model) -> list[Stack]:
     """Stacks of substances that are available, whose other values come near to the wish; none where all are."""
     if not wanted.available:
         return []
-    kept = [n for n, keys in _fixed(wanted, starts[0]).items() if keys & INDEX]
+    kept = [n for n, keys in _fixed(wanted, starts[0]).items() if keys & (INDEX | ABSORPTION)]
     found = []
-    for stack in made_of(starts, wanted.available, kept):
+    for stack in made_of(starts, wanted.available, kept, wanted.thinnest):
         search = _Search.of(wanted, stack, model.surrogate)
         found.append(search.values.placed(search.straight(QUICK))[0])
     return found
 
 
+def _thickened(stack: Stack, thinnest: float) -> Stack:
+    """The stack with media of that depth in the place of thinner ones that absorb and scatter as much.
+
+    Raises:
+        InvalidInput: a thinner one has pigments.
+    """
+    layers = list(stack.layers)
+    for n, (layer, values) in enumerate(zip(stack.layers, Material.of(stack).layers)):
+        if isinstance(layer, Medium) and isinstance(values, MediumValues) and values.depth < thinnest:
+            if layer.pigments:
+                raise InvalidInput(f"thinnest: layer {n} has a depth of {values.depth:g}, which its pigments need")
+            share = values.depth / thinnest
+            thinned = {key: written(share * np.ravel(getattr(values, key))) for key in COEFFICIENTS}
+            layers[n] = layer.model_copy(update={"depth": thinnest, **thinned})
+    return stack.with_layers(layers)
+
+
 def _held(wanted: Target, stack: Stack, model: Model) -> Target:
     """The wish, with the lobes of the present material where these stay."""
-    if wanted.lobes or not any(wish.keeps_lobes for wish in wanted.further):
+    alone = wanted.available or not wanted.further
+    if wanted.lobes or not (alone or any(wish.keeps_lobes for wish in wanted.further)):
         return wanted
     seen = stack_lobes(stack, 1.0, model=model)
     lobes = []
@@ -307,7 +327,10 @@ class _Search:
             kept = fixed.get(free.layer, set()) | (INDEX if wish.available else set())
             return None if free.keys[0].partition("_")[0] in kept else (moved or [free])[0]
 
-        values = FreeValues(start=stack, eta_max=wish.eta_max, allowed=allowed)
+        coats = laid(stack, wish.available)
+        values = FreeValues(
+            start=stack, eta_max=wish.eta_max, allowed=allowed, laid=frozenset(coats), thinnest=wish.thinnest
+        )
         return cls(wish, values, model)
 
     @cached_property
@@ -337,10 +360,13 @@ class _Search:
         return x
 
     def answer(self, x: Array, wanted: Target) -> Answer:
-        """The answer at a point; without the clear media that the search added."""
+        """The answer at a point; without the clear media that the search added, unless coats are to be so thick."""
         stack, seen = self.values.placed(x)
-        kept = stack if wanted.start else stack.with_layers(stack.layers[n] for n in seen)
-        named = kept.model_copy(update={"name": wanted.name or stack.name})
+        if wanted.thinnest:
+            stack = _thickened(stack, wanted.thinnest)
+        elif wanted.available or not wanted.start:
+            stack = stack.with_layers(stack.layers[n] for n in seen)
+        named = stack.model_copy(update={"name": wanted.name or stack.name})
         return Answer(named, wanted, self.model, float(np.linalg.norm(self._read(x))))
 
     def _to(self, x: Array, part: float, effort: _Effort) -> tuple[Array, Array]:
@@ -387,5 +413,5 @@ def _fixed(wish: Target, stack: Stack) -> dict[int, set[str]]:
             found[place] = {key for key in ("eta", "k", "alpha") if lobe.fixed.of(key, n) is not None}
             above = place - 1
             while lobe.fixed.of("tau", n) is not None and above >= 0 and isinstance(stack.layers[above], Medium):
-                found[above], above = {"sigma"}, above - 1
+                found[above], above = ABSORPTION, above - 1
     return found

@@ -18,7 +18,7 @@ from velatura.stack.layers import film_key
 from velatura.stack.values import THICKEST_NM
 
 CONDUCTOR, BRIGHTEST = (0.02, 30.0), 0.999  # bounds of a metal's eta, and of its reflectance in air
-DEPTH_MAX = 10.0  # of a medium
+DEPTH_MIN, DEPTH_MAX = 1e-3, 10.0  # of a medium, that of a coat at least
 THINNEST_NM = 1.0  # of a film
 
 
@@ -61,7 +61,8 @@ class FreeValues:
     """Indices, roughnesses, absorption and albedo of a stack; all else stays.
 
     darkest: the least `share` of conductors; 0 for metals, k >= eta. films: whether indices and thicknesses of films
-    change. allowed: a value with the bounds that it may change within, None where it stays.
+    change. allowed: a value with the bounds that it may change within, None where it stays. laid: media of which the
+    depth changes, from the `thinnest`, in the place of what they absorb per unit of it.
     """
 
     start: Stack
@@ -69,6 +70,8 @@ class FreeValues:
     darkest: float = 0.0
     films: bool = True
     allowed: Callable[[Free], Free | None] = lambda free: free
+    laid: frozenset[int] = frozenset()
+    thinnest: float = 0.0
 
     @cached_property
     def material(self) -> Material:
@@ -83,7 +86,9 @@ class FreeValues:
     def free(self) -> list[Free]:
         found: list[Free] = []
         for n, layer in enumerate(self.material.layers):
-            if type(layer) in FREE:
+            if n in self.laid and isinstance(layer, MediumValues):
+                found += _of_coat(n, layer, self.thinnest)
+            elif type(layer) in FREE:
                 found += FREE[type(layer)](n, layer, self.eta_max, self.darkest)
             if isinstance(layer, InterfaceValues) and self.films:
                 found += _of_films(n, layer, self.eta_max)
@@ -134,6 +139,14 @@ def _of_medium(n: int, layer: MediumValues, eta_max: float, darkest: float) -> l
     if layer.depth <= 0:
         return []
     return [Free(n, ("sigma_a",), c, 0.0, DEPTH_MAX / layer.depth, False) for c in range(3)]
+
+
+def _of_coat(n: int, layer: MediumValues, thinnest: float) -> list[Free]:
+    most = float(np.max(layer.sigma_a))
+    if most == 0:
+        return []
+    low, high = max(thinnest, DEPTH_MIN / most), max(2 * thinnest, DEPTH_MAX / most)
+    return [Free(n, ("depth",), None, low, high, True)]
 
 
 def _of_interface(n: int, layer: InterfaceValues, eta_max: float, darkest: float) -> list[Free]:

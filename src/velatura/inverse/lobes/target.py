@@ -35,6 +35,7 @@ from velatura.stack.values import (
 BLUR = MAPS["belcour"]  # in whose space a target's variance is given
 KEPT = 1e-6  # by which what is fixed may be missed
 ROUND = 1e-6  # difference of roughnesses of a lobe that has no axes
+FURTHER = (*KINDS, "available", "thinnest")  # keys that ask for more than lobes
 LEAST = 1e-4  # energy or variance below which targets do not differ
 
 
@@ -255,6 +256,7 @@ class Target(Record):
     film: Annotated[tuple[FilmColour, ...], Wished("of the colour of a film", record=FilmColour, most=1)] = ()
     mixture: Annotated[tuple[MixtureColour, ...], Wished("of the colour of a mixture", record=MixtureColour)] = ()
     available: Annotated[tuple[Any, ...], Available("substances that interfaces may lie above")] = ()
+    thinnest: Annotated[float, _number("the least depth of a medium")] = 0.0
 
     def __init__(self, /, lobes: Iterable[TargetLobe | Mapping[str, Any]] = (), **options: Any) -> None:
         if isinstance(lobes, str | Mapping) or not isinstance(lobes, Iterable):
@@ -263,12 +265,10 @@ class Target(Record):
 
     @model_validator(mode="after")
     def _lobes_fit_together(self) -> Target:
-        if self.available and not self.lobes:
-            raise ValueError("available: chooses indices of lobes; write lobes")
-        if not self.lobes and not (self.further and self.start):
-            other = "; without any, write a start" if self.further else f", or {', '.join(KINDS)} with a start"
+        if not self.lobes and not (self.beyond_lobes and self.start):
+            other = "; without any, write a start" if self.beyond_lobes else f", or {', '.join(FURTHER)} with a start"
             raise ValueError(f"lobes: must hold at least one lobe{other}")
-        if isinstance(self.start, Mix) and (self.lobes or any(wish.key != MixtureColour.key for wish in self.further)):
+        if isinstance(self.start, Mix) and (self.lobes or self.beyond_lobes != (MixtureColour.key,)):
             raise ValueError(
                 "start: the inverse takes a single stack, not a mixture, of which only mixture may be asked"
             )
@@ -287,7 +287,7 @@ class Target(Record):
     @property
     def beyond_lobes(self) -> tuple[str, ...]:
         """Keys that ask for more than lobes."""
-        return tuple(key for key in (*KINDS, "available") if getattr(self, key))
+        return tuple(key for key in FURTHER if getattr(self, key))
 
     def of_lobes(self) -> Target:
         """This target, which asks for lobes alone. Raises InvalidInput where it asks for more."""
