@@ -710,3 +710,45 @@ def test_further_wishes_are_dragged(visit: Open) -> None:
     assert page.state("parts.0.weight") == pytest.approx(shares[np.argmin(missed)], abs=0.01)
     assert page.state("parts.1.layers.2.keys.albedo") == pigment
     look.get_by_text("No weights of these parts give").wait_for()
+
+
+def test_a_material_is_made_of_what_a_workshop_has(visit: Open) -> None:
+    """Expected: the choices are of these substances, the nearest first, and one is taken as one step; a lacquer of the
+    material's own coat is laid as thick as it was, or as the slider asks for."""
+    page = visit()
+    page.page.evaluate("void (velatura.viewport.thumbnail = () => new Promise(() => {}))")
+    open_material(page, "Coloured absorbing coat")
+    look = panel(page).locator("details.workshop")
+    look.locator("summary").click()
+    look.get_by_role("button", name="Add those of the material").click()
+    look.get_by_label("Add a substance").select_option("Cu")
+    look.get_by_label("Index of a substance").fill("1.7")
+    look.get_by_label("Index of a substance").press("Enter")
+    look.get_by_role("button", name="Add", exact=True).click()
+    look.locator(".stock li").nth(3).wait_for()
+
+    def take(place: int) -> None:
+        look.get_by_role("button", name="Make it of these").click()
+        page.settled()
+        past = steps(page)
+        look.locator(".choices button").nth(place).click()
+        page.settled()
+        assert steps(page) == past + 1
+
+    def values() -> list[dict[str, Any]]:
+        return [layer["keys"] for layer in page.state("layers")]
+
+    take(0)
+    surface, coat, metal = values()
+    assert (surface["eta"], coat["sigma_a"], metal["conductor"]) == (1.8, [1, 0.7, 0.2], "Al")
+    assert coat["depth"] == pytest.approx(1, abs=1e-3) and metal["alpha"] == pytest.approx(0.2, abs=1e-3)
+    assert look.locator(".choices li").first.inner_text().split("off by")[0].strip() == "1.8, 1 deep, Al"
+
+    look.get_by_label("Depth of coats at least", exact=True).fill("2")
+    look.get_by_label("Depth of coats at least", exact=True).press("Enter")
+    look.get_by_role("button", name="Remove 1.7").click()
+    look.locator(".stock li").nth(3).wait_for(state="detached")
+    take(1)
+    surface, coat, metal = values()
+    assert surface["eta"] == 1.8 and coat["depth"] >= 2 and metal["conductor"] in ("Al", "Cu")
+    assert len(look.locator(".choices button").all()) == 2

@@ -817,6 +817,20 @@ def test_a_mixture_is_asked_for_its_colour_alone() -> None:
         VERBS["wish"]({"material": mix, "target": {"body": {"energy": 0.35}}})
 
 
+def test_a_material_is_made_of_what_is_available() -> None:
+    """Expected: the answers of the library, the nearest first, which is the material where it can be had."""
+    gold = {"layers": [{"interface": {"eta": 1.5, "alpha": 0.1}}, {"interface": {"conductor": "Au", "alpha": 0.2}}]}
+    body = {"material": gold, "model": "bati2021", "available": [1.5, "water", "Au"]}
+    first, second = VERBS["stock"](body)["choices"]
+    assert first["off"] < 1e-3 < second["off"]
+    surfaces = vt.Stack.from_dict(second["material"]).interfaces
+    assert surfaces[0].eta == "water" and surfaces[1].conductor == "Au"
+    found = vt.inverse.answers({"start": gold, "available": body["available"]}, 1, "bati2021")[0]
+    assert vt.Stack.from_dict(first["material"]) == found.stack
+    with pytest.raises(InvalidInput, match="available: must be a list, got nothing"):
+        VERBS["stock"]({"material": gold})
+
+
 def test_a_material_states_what_it_lacks_for_a_wish() -> None:
     """Expected: for a clear pane its haze, and a medium; the way adds what is lacking, which is no more after it."""
     pane = {"layers": [{"interface": {"eta": 1.5, "alpha": 0.1}}, {"interface": {"eta": 1.0}}]}

@@ -19,6 +19,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from velatura.errors import InvalidInput
+from velatura.inverse.wishes import Available
 from velatura.inverse.wishes.wish import STEEPEST
 from velatura.model import DEFAULT, Model, named
 from velatura.stack import Described, Stack, dumps, single
@@ -33,6 +34,7 @@ Verb: TypeAlias = Callable[[Body], Answer]
 _TYPES: dict[Any, str] = {
     str: "text",
     dict: "an object",
+    tuple: "a list",
     bool: "true or false",
     int: "a whole number",
     float: "a number",
@@ -198,6 +200,8 @@ KEYS: dict[str, Parameter] = {
     "model": Words("of a model"),
     "switches": Fields("of the model"),
     "coarse": Flag("directions, and searches"),
+    "available": Available("substances that a workshop has"),
+    "thinnest": Scalar("depth of a coat", low=0, texturable=False),
     "angle": Scalar("of a second look, degrees", low=0, high=STEEPEST, texturable=False),
     "lobe": Whole("which lobe of the target", high=LOBES - 1),
     "layer": Whole("which layer of the material", high=LAYERS - 1),

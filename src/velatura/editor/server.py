@@ -47,7 +47,7 @@ LANES = {"quick": (4, 512), "picture": (2, 64), "slow": (4, 32)}
 SPARE = 4  # threads of a kind beside these, for answers that were given up, which go on until they end
 LANE_OF = {
     **dict.fromkeys(("shader", "values", "appearance", "wishes"), "picture"),
-    **dict.fromkeys(("invert", "ways", "wish", "class", "member", "coat", "targets"), "slow"),
+    **dict.fromkeys(("invert", "ways", "wish", "stock", "class", "member", "coat", "targets"), "slow"),
     **dict.fromkeys(("truth", "validation", "film", "export", "import", "render"), "slow"),
 }
 

@@ -1,4 +1,5 @@
-"""The wishes of the Appearance panel that are beyond lobes: what a material shows of each, and the answer to one."""
+"""The wishes of the Appearance panel that are beyond lobes: what a material shows of each, the answer to one, and the
+material made of what a workshop has."""
 
 from __future__ import annotations
 
@@ -15,6 +16,7 @@ from velatura.model.registry import stack_lobes
 from velatura.stack import Described, Mix
 
 ANGLE = 75.0  # of the second look
+CHOICES = 4  # of what a workshop has
 TILTED, BLURRED = "grazing", "passed"  # seen at that angle, and with a blur that needs no absorption
 
 
@@ -56,5 +58,14 @@ def wish(body: Body) -> Answer:
     return {"material": document(found.stack), "wishes": shown, "snapped": snapped}
 
 
+def stock(body: Body) -> Answer:
+    """The material made of substances that are `available`, with coats of `thinnest` at least: `choices`, the nearest
+    first, each with its `material` and how far its lobes are `off`, in units of CIE 1976."""
+    available, thinnest = field(body, "available", tuple), body.get("thinnest", 0.0)
+    target = Target(start=material_of(body), available=available, thinnest=thinnest)
+    found = nearest_answers(target, CHOICES, model_of(body))
+    return {"choices": [{"material": document(each.stack), "off": each.units} for each in found]}
+
+
 #: What `service.VERBS` takes over.
-VERBS: dict[str, Verb] = {"wishes": wishes, "wish": wish}
+VERBS: dict[str, Verb] = {"wishes": wishes, "wish": wish, "stock": stock}

@@ -79,6 +79,11 @@ class Answer:
         return _Seen.of(self.target, self.stack, self.model).reached
 
     @property
+    def units(self) -> float:
+        """The distance of lobes in units of CIE 1976; a variance counts by its share."""
+        return 100 * self.missed / FIRST
+
+    @property
     def met(self) -> bool:
         """Whether the stack has what is asked for."""
         return self.missed < MISSED

@@ -10,6 +10,7 @@ import { described, handles } from './appearance/handles.js';
 import { about, axesOf, blurOf, changed, hue, withBlur, withMean } from './appearance/looks.js';
 import { asker, oneAtATime } from './appearance/questions.js';
 import { createWishes } from './appearance/wishes.js';
+import { createWorkshop } from './appearance/workshop.js';
 import { colourRow, hex } from './colour.js';
 import { capital, dial, iconButton, menu, number, styles } from './controls.js';
 import { mean, shown } from './plots/scale.js';
@@ -198,6 +199,7 @@ export function mountAppearance(element, services) {
   });
 
   const further = createWishes(services, { ask, question, paint });
+  const workshop = createWorkshop(services, { question, paint });
 
   function choose(index) {
     if (index === chosen) return;
@@ -217,7 +219,7 @@ export function mountAppearance(element, services) {
 
   const panel = () => html`<section class="appearance" aria-label="Appearance">
     ${ofPart(chosenPart(store.get()))} ${read.says ? html`<p class="says">${saying()}</p>` : nothing} ${read.target ? lobes() : nothing}
-    ${further.view()} ${read.target && !read.says ? [theClass(), theCoat()] : nothing}
+    ${further.view()} ${workshop.view()} ${read.target && !read.says ? [theClass(), theCoat()] : nothing}
     <div class="actions">
       <button type="button" @click=${pin} title="Keep this one on the right of the picture, to compare others with it">
         Pin as B
@@ -445,7 +447,7 @@ export function mountAppearance(element, services) {
     follow,
     /** Whether nothing is asked for, and nothing under the hand. */
     get quiet() {
-      return !held && !wishes.busy && !reading && !further.busy;
+      return !held && !wishes.busy && !reading && !further.busy && !workshop.busy;
     },
     /** Stores the target of a material by a model in advance. */
     know: (material, model, answer) => known.set(textOf(material, { model, switches: {} }), { says: null, ...answer }),
