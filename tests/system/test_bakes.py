@@ -50,6 +50,7 @@ def test_a_dielectric_over_paint_is_held_by_all(baked: Bake) -> None:
     index, roughness = {
         "openpbr": ("specular_ior", "specular_roughness"),
         "gltf": ("ior", "roughnessFactor"),
+        "gltf-coat": ("ior", "roughnessFactor"),
         "blender-principled": ("IOR", "Roughness"),
         "mitsuba-principled": ("eta", "roughness"),
     }[baked.target]

@@ -40,7 +40,7 @@ MAY_IMPORT = {
     "programs": "light stack optics renderer model reference binding kernel pictures",
     "bakes": "programs",  # and `imports`: public names
     "imports": "programs",
-    "exports": "stack model shader programs api kernel",
+    "exports": "stack model shader programs scenes api kernel",
     "inverse": "stack optics tables model ops films api kernel",
     "light": "renderer",
     "reference": "light stack optics ops kernel binding renderer films media metals",

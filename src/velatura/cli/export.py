@@ -60,6 +60,13 @@ def export(
             help="For shaders: a file of all tables, which several materials share, in place of one for each.",
         ),
     ] = None,
+    mesh: Annotated[
+        str | None,
+        typer.Option(
+            metavar="NAME|F",
+            help="For gltf: what shows the material, an object of scenes such as sphere, or a file of glTF.",
+        ),
+    ] = None,
     settings: options.Settings = None,
 ) -> None:
     """Write a material as a file of another program."""
@@ -70,7 +77,7 @@ def export(
     if tables is not None:
         files.check_writable(tables, "a file of tables", (".bin",))
     chosen: dict[str, Any] = {"constant": constant or None, "prefix": prefix, "group": group, "binding": binding}
-    chosen |= {"baked": baked or None, "half": half or None, "tables": tables}
+    chosen |= {"baked": baked or None, "half": half or None, "tables": tables, "mesh": mesh}
     chosen = {name: value for name, value in chosen.items() if value is not None}
     for name in chosen:
         if name not in FORMATS[to.value].options:

@@ -63,6 +63,10 @@ FORMATS: dict[str, Format] = {
     "bsdf": Format((".bsdf",), "velatura.exports.bsdf", is_text=False),
     "bsdf-xml": Format((".xml",), "velatura.exports.klems"),
     **{name: Format(baked.endings, "velatura.exports.baked") for name, baked in BAKED.items()},
+    **{
+        name: Format(BAKED[name].endings, "velatura.exports.gltf", options=frozenset({"mesh"}))
+        for name in ("gltf", "gltf-coat")
+    },
 }
 
 
@@ -78,6 +82,7 @@ def export(
     baked: bool = False,
     half: bool = False,
     tables: str | Path | None = None,
+    mesh: str | Path | None = None,
     folder: str | Path | None = None,
     **switches: Any,
 ) -> Export:
@@ -90,7 +95,7 @@ def export(
             "three", a module with a material for three.js; "json", the material with its numbers; "mitsuba-xml", a
             scene to be included; "python", a script that renders it; "bsdf", a measurement that Mitsuba's plugin
             `measured` loads; "bsdf-xml", matrices for WINDOW and Radiance; fitted parameters in "openpbr", "gltf",
-            "blender-principled" or "mitsuba-principled".
+            "gltf-coat", "blender-principled" or "mitsuba-principled".
         model: a named model or its name (None for the default), its choices changed by `switches`.
         constant: for shaders, flat names of values that never change (`layer0_eta`), or ["all"].
         prefix: for shaders, begins all names in the code, so that one program may hold several materials; "vt" by
@@ -100,6 +105,8 @@ def export(
         baked: for shaders of materials without textures, reads lobes over direction from a texture, of any model.
         half: for shaders, writes textures as halves of floats.
         tables: for shaders, a file of all tables, which shaders of any materials share, in place of one for each.
+        mesh: for glTF, what shows the material: an object of scenes ("sphere", "ball"), or a file of glTF, all of whose
+            meshes take the material. None by default: the file holds the material alone.
         folder: where the text will lie, so that a scene may name its textures relative to it.
 
     Raises:
@@ -113,7 +120,7 @@ def export(
     if to not in FORMATS:
         raise InvalidInput(unknown("format", to, FORMATS))
     asked: dict[str, Any] = {"constant": constant or None, "prefix": prefix, "group": group, "binding": binding}
-    asked |= {"baked": baked or None, "half": half or None, "tables": tables}
+    asked |= {"baked": baked or None, "half": half or None, "tables": tables, "mesh": mesh}
     options = {name: value for name, value in asked.items() if value is not None}
     for name in options:
         if name not in FORMATS[to].options:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import time
-from collections.abc import Collection, Iterable, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from dataclasses import asdict, dataclass, field
 from datetime import datetime, timezone
 from pathlib import Path
@@ -83,6 +83,7 @@ class Export(Fields):
     """A text, and the files that belong beside it, by ending: `.tables.bin` is `gold.tables.bin` beside `gold.glsl`.
 
     data: the file itself in a format that is no text, which then is empty.
+    binary: by another ending of the format, what makes the file that has it and is no text.
     costs: of code, what a call of each function costs, in words; notes: of parameters, what is lost, in
     sentences; of code, shared tables that it does not read.
     apart: files that several exports share, by path.
@@ -96,6 +97,7 @@ class Export(Fields):
     notes: tuple[str, ...] = ()
     apart: Mapping[Path, bytes] = field(default_factory=dict)
     data: bytes | None = None
+    binary: Mapping[str, Callable[[], bytes]] = field(default_factory=dict)
     facts: Mapping[str, Any] = field(default_factory=dict)
     textures: Sequence[Stored] = ()
 
@@ -112,8 +114,13 @@ class Export(Fields):
             with files.whole(other) as unfinished:
                 unfinished.write_bytes(data)
         with files.whole(path) as unfinished:
-            unfinished.write_bytes(self.text.encode() if self.data is None else self.data)
+            unfinished.write_bytes(self._content(path.suffix.lower()))
         return [path, *others]
+
+    def _content(self, ending: str) -> bytes:
+        if ending in self.binary:
+            return self.binary[ending]()
+        return self.text.encode() if self.data is None else self.data
 
     def described(self, path: Path) -> str:
         """The facts in JSON, where the file has a path."""

@@ -24,7 +24,8 @@ class Baked(NamedTuple):
 #: Programs that are written, by the name of the format.
 BAKED = {
     "openpbr": Baked("velatura.programs.openpbr.write", (".mtlx",)),
-    "gltf": Baked("velatura.programs.gltf.write", (".gltf",)),
+    "gltf": Baked("velatura.programs.gltf.write", (".gltf", ".glb")),
+    "gltf-coat": Baked("velatura.programs.gltf.coated", (".gltf", ".glb")),
     "blender-principled": Baked("velatura.programs.blender.write", (".py",)),
     "mitsuba-principled": Baked("velatura.programs.principled.write", (".xml",)),
 }

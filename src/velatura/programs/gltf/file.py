@@ -18,7 +18,7 @@ from velatura.programs.given import is_number
 from velatura.programs.gltf import read as gltf
 from velatura.programs.gltf.images import Images
 from velatura.programs.gltf.parameters import ANISOTROPY, CHANNELS, CLEARCOAT, COAT, CORE
-from velatura.programs.imported import Imported, Notes, shown
+from velatura.programs.imported import Imported, Left, Notes, shown
 from velatura.programs.surface import INDICES
 from velatura.programs.values import Value, changed
 from velatura.stack import Texture, loads
@@ -36,8 +36,7 @@ def materials(path: Path) -> tuple[dict[str, Callable[[Notes], Imported]], None]
     Raises:
         InvalidInput: it cannot be read, or is no glTF.
     """
-    text, chunk = _parts(path, files.content(path))
-    document = _document(path, text)
+    document, chunk = read(path)
     images = Images(path, document, chunk)
     found: dict[str, Callable[[Notes], Imported]] = {}
     entries = document.get("materials", [])
@@ -81,8 +80,11 @@ def of_material(
     """
     held = embedded.of_gltf(material)
     if held is not None:
-        notes.add("extras", embedded.KEY, embedded.READ)
-        return Imported(loads(json.dumps(held), "the stack in extras.json", folder), tuple(notes.left))
+        try:
+            stack = loads(json.dumps(held), "the stack in extras.json", folder)
+            return Imported(stack, (Left("extras", embedded.KEY, embedded.READ),))
+        except InvalidInput as error:  # its images may lie elsewhere, and inside the file
+            notes.add("extras", embedded.KEY, f"the parameters are read, since {error}")
     extensions = _holding(material.get("extensions", {}), "extensions")
     parts = {name: _holding(part, name) for name, part in {CORE: material.get(CORE, {}), **extensions}.items()}
     if COAT in parts:
@@ -180,6 +182,16 @@ def _scaled(texture: Texture, factor: Any, least: float, name: str, notes: Notes
         notes.add(name, shown(tuple(factor)), "its mean is a factor on the image")
     most = float(np.mean(factor))
     return changed(texture, lambda x: least + (most - least) * x)
+
+
+def read(path: Path) -> tuple[Mapping[str, Any], bytes | None]:
+    """The JSON of a file, and its binary chunk if it is a .glb that has one.
+
+    Raises:
+        InvalidInput: it cannot be read, or is no glTF.
+    """
+    text, chunk = _parts(path, files.content(path))
+    return _document(path, text), chunk
 
 
 def _parts(path: Path, data: bytes) -> tuple[str, bytes | None]:

@@ -7,7 +7,7 @@ import numpy as np
 from velatura.optics import fresnel
 from velatura.programs import closures
 from velatura.programs.closures import Array, Number, ViewAndLight
-from velatura.programs.gltf.parameters import PARAMETERS
+from velatura.programs.gltf.parameters import COATING, PARAMETERS
 from velatura.programs.parameters import Values, complete
 
 COAT_F_0 = 0.04  # of an index of 1.5
@@ -20,7 +20,7 @@ def alphas(roughness: Number, strength: float) -> tuple[Number, Number]:
 
 def value(given: Values, pair: ViewAndLight, thin: bool = True) -> Array:
     """f |cos theta_o| (3, N) of appendix B and the extensions; `thin`: no refraction, as without a volume."""
-    v = complete(PARAMETERS, given)
+    v = complete((*PARAMETERS, *COATING), given)
     base, tint = (np.reshape(v[name], (3, 1)) for name in ("baseColorFactor", "specularColorFactor"))
     au, av = closures.anisotropic(*alphas(v["roughnessFactor"], v["anisotropyStrength"]))
     turn = v["anisotropyRotation"]
@@ -43,6 +43,16 @@ def value(given: Values, pair: ViewAndLight, thin: bool = True) -> Array:
     material = (1 - v["metallicFactor"]) * dielectric + v["metallicFactor"] * f_metal * lobe
 
     # Clearcoat, by the Fresnel reflectance of the normal
-    alpha = max(v["clearcoatRoughnessFactor"] ** 2, closures.ALPHA_MIN)
     share = v["clearcoatFactor"] * closures.schlick(pair.cos_i, COAT_F_0)
-    return np.asarray((1 - share) * material + share * pair.reflected * closures.microfacets(pair, alpha, alpha))
+    alpha = max(v["clearcoatRoughnessFactor"] ** 2, closures.ALPHA_MIN)
+    coated = (1 - share) * material + share * pair.reflected * closures.microfacets(pair, alpha, alpha)
+
+    # Coat, likewise, which tints and darkens by its weight (KHR_materials_coat; darkening of OpenPBR 1.1)
+    weight, eta, tint = v["coatFactor"], v["coatIor"], np.reshape(v["coatColorFactor"], (3, 1))
+    f_0 = fresnel.normal_incidence(eta)
+    inside = 1 - (1 - f_0) / eta**2
+    darkening = 1 + v["coatDarkeningFactor"] * ((1 - inside) / (1 - base * inside) - 1)
+    share = weight * closures.schlick(pair.cos_i, f_0)
+    au, av = closures.anisotropic(*alphas(v["coatRoughnessFactor"], v["coatAnisotropyStrength"]))
+    facets = pair.reflected * closures.microfacets(pair, au, av, v["coatAnisotropyRotation"])
+    return np.asarray((1 - share) * (1 - weight + weight * tint * darkening) * coated + share * facets)

@@ -48,7 +48,7 @@ class Images:
         uri = image.get("uri")
         if isinstance(uri, str) and not uri.startswith("data:"):
             return self._path.parent / unquote(uri)
-        data = _inline(where, uri) if isinstance(uri, str) else self._view(where, image.get("bufferView"))
+        data = inline(where, uri) if isinstance(uri, str) else self._view(where, image.get("bufferView"))
         ending = pictures.ending(data)
         if not ending:
             return "inside the file, neither PNG nor JPEG"
@@ -72,10 +72,8 @@ class Images:
             elif not isinstance(uri, str):
                 raise InvalidInput(f"{where}: has no data")
             else:
-                inline = uri.startswith("data:")
-                self._buffers[index] = (
-                    _inline(where, uri) if inline else files.content(self._path.parent / unquote(uri))
-                )
+                inside = uri.startswith("data:")
+                self._buffers[index] = inline(where, uri) if inside else files.content(self._path.parent / unquote(uri))
         return self._buffers[index]
 
     def _entry(self, part: str, index: object) -> Mapping[str, Any]:
@@ -95,7 +93,7 @@ def _count(where: str, view: Mapping[str, Any], key: str) -> int:
     return value
 
 
-def _inline(where: str, uri: str) -> bytes:
+def inline(where: str, uri: str) -> bytes:
     """The data in a URI (RFC 2397), which glTF has in base64."""
     kind, _, text = uri.partition(",")
     if not kind.endswith(";base64"):

@@ -36,6 +36,17 @@ PARAMETERS = (
     Input("iridescenceThicknessMaximum", 400.0, high=GREATEST, within=IRIDESCENCE, fit=("thickness", 10.0, 2000.0)),
 )
 
+#: The coat, as proposed (https://github.com/KhronosGroup/glTF/pull/2534). It stands in place of a clearcoat.
+COATING = (
+    Input("coatFactor", 0.0, within=COAT),
+    Input("coatRoughnessFactor", 0.0, within=COAT),
+    Input("coatIor", 1.5, low=1.0, high=GREATEST, within=COAT, fit=("coat", 1.001, 3.0)),
+    Input("coatColorFactor", (1.0, 1.0, 1.0), within=COAT, fit=("coat", *UNIT)),
+    Input("coatDarkeningFactor", 1.0, within=COAT, fit=("coat", *UNIT)),
+    Input("coatAnisotropyStrength", 0.0, within=COAT, fit=("brushed", *UNIT)),
+    Input("coatAnisotropyRotation", 0.0, -GREATEST, GREATEST, COAT),  # anticlockwise
+)
+
 #: Channels of images that stand in place of factors.
 CHANNELS = {
     "baseColorFactor": "rgb",

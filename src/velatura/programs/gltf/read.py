@@ -18,14 +18,7 @@ from velatura.programs.values import Value, changed
 
 PARAMETERS = (
     *parameters.PARAMETERS,
-    # As proposed (https://github.com/KhronosGroup/glTF/pull/2534)
-    Input("coatFactor", 0.0, within=parameters.COAT),
-    Input("coatRoughnessFactor", 0.0, within=parameters.COAT),
-    Input("coatIor", 1.5, low=1.0, high=GREATEST, within=parameters.COAT),
-    Input("coatColorFactor", (1.0, 1.0, 1.0), within=parameters.COAT),
-    Input("coatDarkeningFactor", 1.0, within=parameters.COAT),
-    Input("coatAnisotropyStrength", 0.0, within=parameters.COAT),
-    Input("coatAnisotropyRotation", 0.0, -GREATEST, GREATEST, parameters.COAT),  # anticlockwise
+    *parameters.COATING,
     Input("emissiveFactor", (0.0, 0.0, 0.0), high=GREATEST),
     Input("sheenColorFactor", (0.0, 0.0, 0.0), within="KHR_materials_sheen"),
     Input("alpha", 1.0),

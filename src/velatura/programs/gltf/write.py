@@ -11,31 +11,33 @@ import numpy as np
 from velatura.optics import fresnel
 from velatura.programs import embedded
 from velatura.programs.gltf import formulas
-from velatura.programs.gltf.parameters import CORE, PARAMETERS, VOLUME
+from velatura.programs.gltf.parameters import CLEARCOAT, COAT, COATING, CORE, PARAMETERS, VOLUME
 from velatura.programs.program import Bake, Fitted, Program, mean_alpha, product, rgb, roughness
-from velatura.programs.surface import Surface
+from velatura.programs.surface import Alpha, Surface
 from velatura.version import __version__
+
+FACETS = ("roughnessFactor", "anisotropyStrength", "anisotropyRotation")
+COATED = ("coatFactor", "coatIor", "coatRoughnessFactor", "coatAnisotropyStrength")  # what a clearcoat has of a coat
 
 
 def start(surface: Surface) -> Fitted:
     """Parameters of a surface, whose coat's colour goes into the base."""
-    u, v = np.asarray(surface.alpha, float)  # of two axes, the one across is the smoother one
+    values, coat = uncoated(surface), surface.coat
+    if not surface.clear:
+        values["baseColorFactor"] = product(surface.colour, coat.colour)
+    return values | (_clearcoat(coat.share, coat.eta, mean_alpha(coat.alpha)) if surface.coated else {})
+
+
+def uncoated(surface: Surface) -> Fitted:
+    """Parameters of a surface without what a coat adds."""
     values: Fitted = {
-        "baseColorFactor": rgb(surface.tint) if surface.clear else product(surface.colour, surface.coat.colour),
+        "baseColorFactor": rgb(surface.tint if surface.clear else surface.colour),
         "metallicFactor": surface.metalness,
-        "roughnessFactor": roughness(v),
-        "anisotropyStrength": float(np.sqrt(np.clip((u - v) / max(1 - v, 1e-6), 0, 1))),
-        "anisotropyRotation": float(np.radians(surface.rotation)),
         "ior": surface.eta if surface.metalness < 1 else 1.5,
         "specularFactor": 0.0 if surface.eta == 1 and not (surface.metalness or surface.clear) else 1.0,
         "transmissionFactor": surface.clear,
+        **dict(zip(FACETS, facets(surface.alpha, surface.rotation))),
     }
-    if surface.coated:
-        values |= {
-            "clearcoatFactor": surface.coat.share
-            * min(fresnel.normal_incidence(surface.coat.eta) / formulas.COAT_F_0, 1),
-            "clearcoatRoughnessFactor": roughness(mean_alpha(surface.coat.alpha)),
-        }
     if surface.film:
         n, nm = surface.film
         thickness = {"iridescenceThicknessMaximum": float(nm)}  # type: ignore[arg-type]
@@ -43,17 +45,34 @@ def start(surface: Surface) -> Fitted:
     return values
 
 
+def facets(alpha: Alpha, rotation: float) -> tuple[float, float, float]:
+    """Roughness, and strength and angle of anisotropy, of facets; of their two axes, the one across is the smoother."""
+    u, v = np.asarray(alpha, float)
+    strength = float(np.sqrt(np.clip((u - v) / max(1 - v, 1e-6), 0, 1)))
+    return roughness(v), strength, float(np.radians(rotation))
+
+
+def _clearcoat(share: float, eta: float, alpha: float) -> Fitted:
+    weight = share * min(fresnel.normal_incidence(eta) / formulas.COAT_F_0, 1)
+    return {"clearcoatFactor": weight, "clearcoatRoughnessFactor": roughness(alpha)}
+
+
 def text(made: Bake, material: Any, files: dict[str, str]) -> str:
     """A document without geometry, with the loss and the stack in `extras` of its material."""
     written: dict[str, Any] = {"name": made.name or "material"}
     extensions: dict[str, dict[str, Any]] = {}
-    for parameter, value in made.differing(PARAMETERS):
+    known = tuple(each for each in (*PARAMETERS, *COATING) if each.name in made.values)
+    for parameter, value in made.differing(known):
         part = written if parameter.within == CORE else extensions
         number = [*value, 1.0] if parameter.name == "baseColorFactor" and isinstance(value, tuple) else value
         part.setdefault(parameter.within, {})[parameter.name] = number
     for name, image in made.images.items():  # of the base's colour alone
         core = written.setdefault(CORE, {})
         core |= {name: [*rgb(image.factor), 1.0], "baseColorTexture": {"index": 0}}
+    if COAT in extensions:  # for programs that know none but a clearcoat
+        share, eta, rough, strength = (made.values[name] for name in COATED)
+        alpha = mean_alpha(formulas.alphas(rough, strength))  # type: ignore[arg-type]
+        extensions[CLEARCOAT] = dict(_clearcoat(share, eta, alpha))  # type: ignore[arg-type]
     if made.passed.any() and not made.thin:
         extensions[VOLUME] = {"thicknessFactor": 1.0}
     if extensions:

@@ -14,6 +14,7 @@ const GROUPS = {
     'blender-principled': 'Blender, Principled BSDF',
     openpbr: 'OpenPBR, MaterialX',
     gltf: 'glTF 2.0',
+    'gltf-coat': 'glTF 2.0, with a coat',
     three: 'three.js, material',
     mtlx: 'MaterialX, by closures',
     'mitsuba-principled': 'Mitsuba 3, principled',

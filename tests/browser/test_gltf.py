@@ -1,0 +1,96 @@
+"""Exports of glTF as three.js loads and draws them in headless Chromium."""
+
+from __future__ import annotations
+
+import base64
+import io
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import chromium
+import in_three
+import numpy as np
+import pytest
+from PIL import Image
+
+import velatura as vt
+
+pytestmark = pytest.mark.skipif(bool(chromium.missing()), reason=chromium.missing())
+
+SIZE = 48
+DRAW = """
+async (text) => {
+  const THREE = await import('three');
+  const { GLTFLoader } = await import('/examples/jsm/loaders/GLTFLoader.js');
+  const bytes = Uint8Array.from(atob(text), (letter) => letter.charCodeAt(0));
+  const { scene } = await new GLTFLoader().parseAsync(bytes.buffer, '');
+  const found = [];
+  scene.traverse((each) => each.isMesh && found.push(each));
+  const [{ material, geometry }] = found;
+  const renderer = new THREE.WebGLRenderer({ alpha: true, preserveDrawingBuffer: true });
+  renderer.setSize(SIZE, SIZE, false);
+  const stage = new THREE.Scene(), camera = new THREE.OrthographicCamera(-1, 1, 1, -1, 0.1, 10);
+  const white = new THREE.DataTexture(new Uint8Array(4 * 4 * 2).fill(255), 4, 2);
+  white.mapping = THREE.EquirectangularReflectionMapping;
+  white.needsUpdate = true;
+  stage.environment = white;
+  stage.add(scene);
+  camera.position.set(0, 1, 4);
+  renderer.render(stage, camera);
+  const picture = renderer.domElement.toDataURL('image/png').split(',')[1];
+  renderer.dispose();
+  renderer.forceContextLoss();
+  const { name, type, metalness, roughness, clearcoat, clearcoatRoughness, anisotropy } = material;
+  return {
+    picture, meshes: found.length, tangents: 'tangent' in geometry.attributes,
+    material: { name, type, metalness, roughness, clearcoat, clearcoatRoughness, anisotropy },
+  };
+}
+""".replace("SIZE", str(SIZE))
+
+
+@pytest.fixture(scope="module")
+def stage() -> Iterator[in_three.Stage]:
+    if not in_three.THREE.is_dir():
+        pytest.skip(f"three.js is missing: npm ci in {in_three.bundle.SOURCES}")
+    with in_three.stage() as opened:
+        yield opened
+
+
+def drawn(stage: in_three.Stage, path: Path) -> tuple[dict[str, Any], np.ndarray]:
+    """What three.js has of a file's material, and its picture, sRGB from 0 to 255 (height, width, 4)."""
+    found = stage.page.evaluate(DRAW, base64.b64encode(path.read_bytes()).decode())
+    picture = Image.open(io.BytesIO(base64.b64decode(found.pop("picture")))).convert("RGBA")
+    return found, np.asarray(picture, float)
+
+
+@pytest.mark.parametrize("ending", [".gltf", ".glb"])
+def test_paint_with_an_image_is_drawn(stage: in_three.Stage, tmp_path: Path, ending: str) -> None:
+    """Expected: one ball, whose upper half has the colours of the upper half of the image: red above, blue below."""
+    if ending == ".glb":
+        halves = np.full((8, 8, 3), 0.1, np.float32)
+        halves[:4, :, 0] = halves[4:, :, 2] = 0.6
+        vt.scenes.write_image(halves, tmp_path / "halves.png")
+        colour: Any = {"texture": str(tmp_path / "halves.png"), "encoding": "srgb"}
+    else:
+        colour = (0.6, 0.1, 0.1)
+    paint = vt.Stack([vt.Interface(eta=1.5, alpha=0.3), vt.Diffuse(albedo=colour)], name="Halves")
+    path = vt.export(paint, "gltf", folder=tmp_path, mesh="sphere").save(tmp_path / f"ball{ending}")[0]
+    found, picture = drawn(stage, path)
+    assert found["meshes"] == 1 and found["tangents"] and found["material"]["name"] == "Halves"
+    above, below = picture[SIZE // 4, SIZE // 2], picture[3 * SIZE // 4, SIZE // 2]
+    assert above[0] > 1.5 * above[2]
+    assert (below[2] > 1.5 * below[0]) == (ending == ".glb")
+    assert picture[0, 0, 3] == 0
+
+
+def test_a_coat_is_a_clearcoat_to_those_that_know_no_other(stage: in_three.Stage, tmp_path: Path) -> None:
+    """Expected: metal of the file's roughness below a clearcoat, though three.js does not read the coat."""
+    gold = vt.Stack([vt.Interface(eta=1.5, alpha=0.04), vt.Interface(conductor="Au", alpha=0.25)])
+    found, picture = drawn(stage, vt.export(gold, "gltf-coat", mesh="sphere").save(tmp_path / "gold.glb")[0])
+    assert found["material"]["type"] == "MeshPhysicalMaterial" and found["material"]["metalness"] == 1
+    assert found["material"]["clearcoat"] == pytest.approx(1, abs=1e-3)
+    assert found["material"]["clearcoatRoughness"] == pytest.approx(0.2, abs=0.02)
+    red, _, blue, _ = picture[SIZE // 2, SIZE // 2]
+    assert red > 1.2 * blue
