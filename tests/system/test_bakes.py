@@ -51,6 +51,7 @@ def test_a_dielectric_over_paint_is_held_by_all(baked: Bake) -> None:
         "openpbr": ("specular_ior", "specular_roughness"),
         "gltf": ("ior", "roughnessFactor"),
         "gltf-coat": ("ior", "roughnessFactor"),
+        "usd": ("ior", "roughness"),
         "blender-principled": ("IOR", "Roughness"),
         "mitsuba-principled": ("eta", "roughness"),
     }[baked.target]
@@ -64,10 +65,11 @@ def test_a_dielectric_over_paint_is_held_by_all(baked: Bake) -> None:
 
 @pytest.mark.parametrize("target", TARGETS)
 def test_a_base_without_an_interface_is_its_colour(target: str) -> None:
-    """Expected: the albedo, to .01 at the normal; `principled` has its own law of diffuse light."""
+    """Expected: the albedo, to .01 at the normal; `principled` has its own law of diffuse light, and UsdPreviewSurface
+    reflects all light at the edge, regardless of its index."""
     made = bake(vt.Stack([vt.Diffuse(albedo=(0.6, 0.2, 0.1))]), target)
     assert made.baked_albedo[:, 0] == pytest.approx(np.array([0.6, 0.2, 0.1]), abs=0.01)
-    assert made.total_variation.max() < 0.03
+    assert made.total_variation.max() < (0.1 if target == "usd" else 0.03)
 
 
 def test_bare_metal_is_what_a_target_that_compensates_has() -> None:

@@ -86,7 +86,22 @@ def of_code(text: str) -> str:
     return re.sub(r"\n\s*\n", "\n", re.sub(r"^shader \w+", "shader", code, flags=re.MULTILINE))
 
 
+def of_usd(text: str) -> Any:
+    """Paths and kinds of all that a layer holds."""
+    sdf = pytest.importorskip("pxr.Sdf", reason='usd-core is missing: pip install "velatura[usd]"')
+    layer, found = sdf.Layer.CreateAnonymous(".usda"), list[tuple[str, list[str]]]()
+    assert layer.ImportFromString(text)
+
+    def seen(path: Any) -> None:
+        if spec := layer.GetObjectAtPath(path):  # there is none of a connection
+            found.append((str(path), sorted(spec.ListInfoKeys())))
+
+    layer.Traverse("/", seen)
+    return found
+
+
 STRUCTURES: dict[str, Structure] = {
+    ".usda": of_usd,
     ".py": of_python,
     ".xml": of_xml,
     ".mtlx": of_xml,

@@ -309,7 +309,7 @@ HOSTILE = {
         document('<surfacematerial name="M"><input name="surfaceshader" nodename="S"/></surfacematerial>'),
         "material M: there is no node S",
     ),
-    "other surface": (document(node("", tag="UsdPreviewSurface")), "its surface UsdPreviewSurface is none of"),
+    "other surface": (document(node("", tag="surface_unlit")), "its surface surface_unlit is none of"),
     "no image": (
         document(GRAPH.replace("wood.png", "oak.png") + node(connected("base_color", "wood_out", "color3"))),
         "oak.png",
@@ -768,7 +768,7 @@ def test_files_that_cannot_be_read_are_refused(tmp_path: Path) -> None:
     for ending in imports.FORMATS:
         path = tmp_path / f"none{ending}"
         assert refusal(lambda path=path: imports.read(path)) == f"{path}: file not found"  # type: ignore[misc]
-    assert "a file to import ends in .mtlx, .gltf, .glb, .xml" in refusal(lambda: imports.read("a.usd"))
+    assert "a file to import ends in .mtlx, .gltf, .glb, .xml" in refusal(lambda: imports.read("a.obj"))
     (tmp_path / "a.mtlx").mkdir()
     assert "is a folder" in refusal(lambda: vt.load(tmp_path / "a.mtlx"))
     assert "cannot be read: is a directory" in refusal(lambda: imports.read(tmp_path / "a.mtlx"))

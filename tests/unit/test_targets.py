@@ -16,6 +16,7 @@ from velatura.programs.closures import ViewAndLight
 from velatura.programs.gltf import formulas as gltf
 from velatura.programs.openpbr import formulas as openpbr
 from velatura.programs.principled import formulas as principled
+from velatura.programs.usd import formulas as usd
 from velatura.renderer.low_discrepancy import square
 from velatura.stack import srgb_sensitivity
 
@@ -105,6 +106,11 @@ GLASS = normal_incidence(1.7)
         (blender, {"Base Color": BLACK, "IOR": 1.5, "Specular IOR Level": 1.0, "Roughness": SMOOTH**0.5}, 0.08),
         (blender, {"Base Color": BLACK, "Specular IOR Level": 0.0, "Coat Weight": 1.0, "Coat IOR": 1.7,
                    "Coat Roughness": SMOOTH**0.5}, GLASS),
+        (usd, {"diffuseColor": BLACK, "ior": 1.7, "roughness": SMOOTH**0.5}, GLASS),
+        (usd, {"diffuseColor": (0.8, 0.8, 0.8), "metallic": 1.0, "roughness": SMOOTH**0.5}, 0.8),
+        # The clearcoat is added, with the index of the base
+        (usd, {"diffuseColor": BLACK, "ior": 1.7, "roughness": SMOOTH**0.5, "clearcoat": 0.5,
+               "clearcoatRoughness": SMOOTH**0.5}, 1.5 * GLASS),
         (principled, {"base_color": BLACK, "eta": 1.7, "roughness": SMOOTH**0.5}, GLASS),
     ],
 )  # fmt: skip

@@ -3,21 +3,42 @@
 from __future__ import annotations
 
 import json
+from pathlib import Path
+from typing import Any
 
 import numpy as np
 
 from velatura.exports.request import Export, Request, relative, stated
 from velatura.programs.fit import TARGETS, bake
+from velatura.programs.program import Bake
 from velatura.shader.closures import Loss
 from velatura.stack import dumps
 
 
 def write(request: Request) -> Export:
     """The file of the program that has the format's name."""
-    made, program = bake(request.material, request.to, request.model), TARGETS[request.to]
-    folder = None if program.anywhere else request.folder
-    files = {name: relative(image.texture.texture, folder) for name, image in made.images.items()}
-    text = program.text(made, json.loads(dumps(request.material, "json", request.folder)), files)
+    made, program = fitted(request, request.to), TARGETS[request.to]
+    text = program.text(made, held(request), files(made, None if program.anywhere else request.folder))
+    return Export(text, notes=tuple(made.summary), facts=facts(made))
+
+
+def fitted(request: Request, target: str) -> Bake:
+    """The material as parameters of a target."""
+    return bake(request.material, target, request.model)
+
+
+def held(request: Request) -> Any:
+    """The material, as a file holds it."""
+    return json.loads(dumps(request.material, "json", request.folder))
+
+
+def files(made: Bake, folder: Path | None) -> dict[str, str]:
+    """Paths of images by parameter."""
+    return {name: relative(image.texture.texture, folder) for name, image in made.images.items()}
+
+
+def facts(made: Bake) -> dict[str, Any]:
+    """Loss of a bake, as facts."""
     differences = np.abs(made.baked_albedo - made.albedo).max(axis=0)
     losses = map(Loss, made.cos_theta, made.total_variation.tolist(), differences.tolist())
-    return Export(text, notes=tuple(made.summary), facts={"loss": stated(losses), "left_out": list(made.lost)})
+    return {"loss": stated(losses), "left_out": list(made.lost)}

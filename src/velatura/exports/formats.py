@@ -63,6 +63,7 @@ FORMATS: dict[str, Format] = {
     "bsdf": Format((".bsdf",), "velatura.exports.bsdf", is_text=False),
     "bsdf-xml": Format((".xml",), "velatura.exports.klems"),
     **{name: Format(baked.endings, "velatura.exports.baked") for name, baked in BAKED.items()},
+    "usd": Format(BAKED["usd"].endings, "velatura.exports.usd"),
     **{
         name: Format(BAKED[name].endings, "velatura.exports.gltf", options=frozenset({"mesh"}))
         for name in ("gltf", "gltf-coat")
@@ -95,7 +96,7 @@ def export(
             "three", a module with a material for three.js; "json", the material with its numbers; "mitsuba-xml", a
             scene to be included; "python", a script that renders it; "bsdf", a measurement that Mitsuba's plugin
             `measured` loads; "bsdf-xml", matrices for WINDOW and Radiance; fitted parameters in "openpbr", "gltf",
-            "gltf-coat", "blender-principled" or "mitsuba-principled".
+            "gltf-coat", "usd" (OpenPBR and UsdPreviewSurface), "blender-principled" or "mitsuba-principled".
         model: a named model or its name (None for the default), its choices changed by `switches`.
         constant: for shaders, flat names of values that never change (`layer0_eta`), or ["all"].
         prefix: for shaders, begins all names in the code, so that one program may hold several materials; "vt" by

@@ -26,6 +26,7 @@ BAKED = {
     "openpbr": Baked("velatura.programs.openpbr.write", (".mtlx",)),
     "gltf": Baked("velatura.programs.gltf.write", (".gltf", ".glb")),
     "gltf-coat": Baked("velatura.programs.gltf.coated", (".gltf", ".glb")),
+    "usd": Baked("velatura.programs.usd.write", (".usda",)),
     "blender-principled": Baked("velatura.programs.blender.write", (".py",)),
     "mitsuba-principled": Baked("velatura.programs.principled.write", (".xml",)),
 }
@@ -36,6 +37,7 @@ FORMATS = {
     ".gltf": "velatura.programs.gltf.file",
     ".glb": "velatura.programs.gltf.file",
     ".xml": "velatura.programs.mitsuba_xml.read",
+    **dict.fromkeys((".usda", ".usd", ".usdc"), "velatura.programs.usd.file"),
 }
 
 

@@ -15,7 +15,7 @@ READ = "holds the stack that the parameters were fitted to, which is read"
 
 def in_xml(material: Any, body: str) -> str:
     """A comment with a material as its file has it, and the text that follows, which it holds for."""
-    text = json.dumps({"digest": _digest(body), "material": material})
+    text = json.dumps({"digest": digest(body), "material": material})
     # Comments of XML hold no two hyphens in a row
     return f"<!-- {KEY} {text.replace('--', '-' + chr(92) + 'u002d')} -->\n{body}"
 
@@ -32,19 +32,19 @@ def of_xml(text: str) -> Any | None:
         held = json.loads(comment) if comment.startswith("{") else {}
     except (ValueError, RecursionError):
         return None
-    return held.get("material") if held.get("digest") == _digest(body) else None
+    return held.get("material") if held.get("digest") == digest(body) else None
 
 
 def in_gltf(material: Any, entry: Mapping[str, Any]) -> dict[str, Any]:
     """Keys of `extras` that hold a material, for an entry of `materials` without them."""
-    return {"digest": _digest(_values(entry)), "material": material}
+    return {"digest": digest(_values(entry)), "material": material}
 
 
 def of_gltf(entry: Mapping[str, Any]) -> Any | None:
     """The material in an entry with what `in_gltf` gives; None without one, or where the entry was changed."""
     extras = entry.get("extras")
     held = extras.get(KEY) if isinstance(extras, Mapping) else None
-    if not isinstance(held, Mapping) or held.get("digest") != _digest(_values(entry)):
+    if not isinstance(held, Mapping) or held.get("digest") != digest(_values(entry)):
         return None
     return held.get("material")
 
@@ -60,5 +60,6 @@ def _values(entry: Mapping[str, Any]) -> str:
     return json.dumps(kept, sort_keys=True)
 
 
-def _digest(text: str) -> str:
+def digest(text: str) -> str:
+    """A short text that is another one for any other text."""
     return hashlib.sha256(text.strip().encode()).hexdigest()[:16]

@@ -75,6 +75,10 @@ class Given:
             self.notes.add(name, value, "one share for all colours, that of green")
         return value.model_copy(update={"channel": "g"}) if value.channel == "rgb" else value
 
+    def replace(self, name: str, value: Value) -> None:
+        """Put another value in place of one that was given."""
+        self._values[name] = value
+
     def leave(self, name: str, why: str) -> None:
         """Note a parameter that is not carried, unless it has its default value."""
         if self._values[name] != self._declared[name].default:

@@ -13,7 +13,7 @@ import numpy as np
 from velatura import files
 from velatura.errors import InvalidInput, within
 from velatura.programs import xml
-from velatura.programs.given import Given
+from velatura.programs.given import ROUNDING, Given
 from velatura.programs.gltf import read as gltf
 from velatura.programs.imported import Imported, Notes
 from velatura.programs.mixture import beside
@@ -22,6 +22,7 @@ from velatura.programs.parameters import Input
 from velatura.programs.principled import read as principled
 from velatura.programs.principled.formulas import COAT_ALPHA
 from velatura.programs.standard_surface import read as standard_surface
+from velatura.programs.usd import read as usd
 from velatura.programs.values import Value, changed, colour, linear, listed
 from velatura.programs.xml import Element
 from velatura.stack import Described, Texture
@@ -32,6 +33,7 @@ SHADERS = {
     "standard_surface": standard_surface,
     "gltf_pbr": gltf,
     "disney_principled": principled,
+    "UsdPreviewSurface": usd,
 }
 
 
@@ -92,7 +94,7 @@ def materials(path: Path) -> tuple[dict[str, Callable[[Notes], Imported]], str |
     found = list(root.of("surfacematerial")) or list(root.of(*SHADERS))
 
     def reader(element: Element) -> Callable[[Notes], Imported]:
-        return lambda notes: _material(element, path, notes)
+        return lambda notes: of_material(element, path, notes)
 
     assigned = {each.get("material") for look in root.of("look") for each in look.of("materialassign")}
     return {element.name: reader(element) for element in found}, assigned.pop() if len(assigned) == 1 else None
@@ -126,7 +128,12 @@ def _document(path: Path) -> Element:
     return gather(path, ())
 
 
-def _material(element: Element, path: Path, notes: Notes) -> Imported:
+def of_material(element: Element, path: Path, notes: Notes) -> Imported:
+    """The material of an element of a document.
+
+    Raises:
+        InvalidInput: it has no surface that is read.
+    """
     surface = element
     if element.tag == "surfacematerial":
         for each in element.of("input"):
@@ -200,7 +207,13 @@ def _surface(surface: Element, path: Path, name: str, notes: Notes) -> Imported:
         raise InvalidInput(f"{path}: material {name}: its surface {surface.tag} is {read}")
     values: dict[str, Any] = dict(DEFAULTS.get(surface.tag, {}))
     source, renamed = SHADERS[surface.tag], RENAMED.get(surface.tag, {})
-    known = [*renamed, *(each.name for each in source.PARAMETERS), *getattr(source, "IGNORED", ()), *_COVER]
+    known = [
+        *renamed,
+        *(each.name for each in source.PARAMETERS),
+        *getattr(source, "IGNORED", ()),
+        *_COVER,
+        "opacityMode",
+    ]
     reader = _Reader(path, notes)
     for each in surface.of("input"):
         parameter = renamed.get(each.name, each.name)
@@ -209,6 +222,9 @@ def _surface(surface: Element, path: Path, name: str, notes: Notes) -> Imported:
         connected = each.get("nodename") or each.get("nodegraph") or each.get("interfacename")
         if parameter not in known:  # of a newer version, or misspelt
             notes.add(each.name, each.get("value") or connected, f"{unknown('input', each.name, known)}: left out")
+            continue
+        if parameter == "opacityMode":  # a word, or a number
+            values[parameter] = each.get("value")
             continue
         if parameter in getattr(source, "IGNORED", {}):
             if connected:
@@ -338,10 +354,14 @@ class _Reader:
             if isinstance(image, Texture) and entry.get("output") == "outa":
                 return image.model_copy(update={"channel": "a"})
             return image
+        if node.tag == "UsdUVTexture":
+            return _uv_texture(node, inputs, entry.get("output") or "rgb", parameter, self._notes)
         if node.tag == "constant":
             return at("value")
         if node.tag in ("dot", "convert"):
             return at("in")
+        if node.tag == "sqrt":
+            return changed(at("in"), lambda x: np.sqrt(np.maximum(x, 0)))
         if node.tag in ("extract", "swizzle", "separate3", "separate4"):
             return _channel(node, at("in"), inputs, entry.get("output"))
         if node.tag in ("multiply", "add", "subtract", "divide", "power", "invert"):
@@ -421,6 +441,31 @@ def _image(node: Element, inputs: Mapping[str, Element], parameter: str, notes: 
     return _together(node, texture, _literal(inputs["factor"])) if "factor" in inputs else texture
 
 
+def _uv_texture(node: Element, inputs: Mapping[str, Element], output: str, parameter: str, notes: Notes) -> Value:
+    """One output of an image of USD, scaled and shifted."""
+    placed = {"file": inputs["file"]} if "file" in inputs else {}
+    if "st" in inputs:
+        placed["texcoord"] = inputs["st"]
+    whole = _image(Element(node.tag, {**node.attributes, "type": "color3"}, node.parent), placed, parameter, notes)
+    assert isinstance(whole, Texture)
+    channel = "rgb" if output.startswith("rgb") else output
+    if channel not in ("rgb", *"rgba"):
+        raise _Unread(f"the node {node.name} ({node.tag}) has no output {output}")
+    space = inputs["sourceColorSpace"].get("value") if "sourceColorSpace" in inputs else "auto"
+    if space == "sRGB" or (space == "auto" and channel == "rgb" and "file" in inputs and not _space(inputs["file"])):
+        whole = whole.model_copy(update={"encoding": "srgb"})
+    numbers = []
+    for key, default in (("scale", 1.0), ("bias", 0.0)):
+        given = listed(inputs[key].get("value") or "") if key in inputs else []
+        given = given if len(given) == 4 else [default] * 4
+        chosen = given[:3] if channel == "rgb" else [given["rgba".index(channel)]]
+        if max(chosen) - min(chosen) > ROUNDING:
+            notes.add(f"{parameter}: {key}", tuple(chosen), "its mean is taken for the image")
+        numbers.append(float(np.mean(chosen)))
+    scale, bias = numbers
+    return changed(whole.model_copy(update={"channel": channel}), lambda x: scale * x + bias)
+
+
 def _file(node: Element, inputs: Mapping[str, Element]) -> Element:
     """The input that names the file of an image."""
     file = inputs.get("file")
@@ -444,7 +489,12 @@ def _placed(inputs: Mapping[str, Element]) -> Iterator[tuple[str, str | None]]:
 
 def _plain_coordinates(entry: Element) -> bool:
     try:
-        return _node(entry).tag == "texcoord"
+        return _node(entry).tag in (
+            "texcoord",
+            "UsdPrimvarReader_float2",
+            "UsdPrimvarReader_vector2",
+            "UsdPrimvarReader",
+        )
     except _Unread:
         return False
 

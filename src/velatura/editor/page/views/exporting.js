@@ -15,6 +15,7 @@ const GROUPS = {
     openpbr: 'OpenPBR, MaterialX',
     gltf: 'glTF 2.0',
     'gltf-coat': 'glTF 2.0, with a coat',
+    usd: 'USD, OpenPBR and preview',
     three: 'three.js, material',
     mtlx: 'MaterialX, by closures',
     'mitsuba-principled': 'Mitsuba 3, principled',

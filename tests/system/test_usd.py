@@ -1,0 +1,258 @@
+"""Layers of USD as OpenUSD reads them: what is written, what comes back, and what others write."""
+
+from __future__ import annotations
+
+import functools
+import sys
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import velatura as vt
+from velatura.errors import MissingTool
+from velatura.exports import baked
+from velatura.programs.usd.write import PROGRAM
+
+pxr = pytest.importorskip("pxr", reason='usd-core is missing: pip install "velatura[usd]"')
+from pxr import Gf, Sdf, Usd, UsdShade, UsdValidation  # noqa: E402
+
+Run = Callable[..., tuple[int, str, str]]
+GOLD = vt.Stack([vt.Interface(eta=1.5, alpha=0.1), vt.Interface(conductor="Au", alpha=0.3)], name="Gold '''\"\\ -->")
+PANE = vt.Stack([vt.Interface(eta=1.5, alpha=0.1), vt.Interface(eta=1.0, alpha=0.1)])
+BRUSHED = vt.Stack([vt.Interface(conductor="Al", alpha=(0.1, 0.3), rotation=20)])
+
+
+_fitted = functools.cache(baked.bake)
+
+
+@pytest.fixture(autouse=True)
+def fitted_once(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Parameters of the same material are fitted once."""
+    monkeypatch.setattr(baked, "bake", _fitted)
+
+
+@pytest.fixture
+def painted(tmp_path: Path) -> vt.Stack:
+    path = tmp_path / "wood @@@ 1.png"
+    vt.scenes.write_image(np.full((4, 4, 3), (0.5, 0.3, 0.1), np.float32), path)
+    rough = {"texture": str(path), "channel": "r"}
+    wood = {"texture": str(path), "encoding": "srgb"}
+    return vt.Stack([vt.Interface(eta=1.5, alpha=rough), vt.Diffuse(albedo=wood)], name="Wood")
+
+
+def saved(stack: vt.Stack, folder: Path, to: str = "usd", name: str = "a.usda") -> Path:
+    return vt.export(stack, to, folder=folder).save(folder / name)[0]
+
+
+def loosened(path: Path) -> Path:
+    """The file, of which the parameters are read, and not the stack."""
+    text = path.read_text(encoding="utf-8")
+    other = path.with_name(f"loose-{path.name}")
+    other.write_text(text.replace('\\"digest\\": \\"', '\\"digest\\": \\"-').replace('"digest": "', '"digest": "-'))
+    return other
+
+
+def test_layers_are_valid(painted: vt.Stack, tmp_path: Path) -> None:
+    """Expected: no complaint of OpenUSD's validators, but that the wheel knows no nodes of MaterialX; these are defined
+    there, with the inputs, types and outputs that the layer has."""
+    import MaterialX as mx
+
+    library = mx.createDocument()
+    mx.loadLibraries(mx.getDefaultDataLibraryFolders(), mx.getDefaultDataSearchPath(), library)
+    for number, stack in enumerate((painted, GOLD, BRUSHED)):
+        stage = Usd.Stage.Open(str(saved(stack, tmp_path, name=f"{number}.usda")))
+        validators = UsdValidation.ValidationRegistry().GetOrLoadAllValidators()
+        for fault in UsdValidation.ValidationContext(validators).Validate(stage):
+            assert fault.GetName() == "MissingShaderIdInRegistry" and "'ND_" in fault.GetMessage(), fault.GetMessage()
+        material = UsdShade.Material(stage.GetDefaultPrim())
+        assert material.ComputeSurfaceSource("")[0].GetIdAttr().Get() == "UsdPreviewSurface"
+        assert material.ComputeSurfaceSource("mtlx")[0].GetIdAttr().Get() == "ND_open_pbr_surface_surfaceshader"
+        for prim in stage.Traverse():
+            shader = UsdShade.Shader(prim)
+            if not shader or not (name := shader.GetIdAttr().Get()).startswith("ND_"):
+                continue
+            definition = library.getNodeDef(name)
+            assert definition, name
+            for each in shader.GetInputs():
+                assert definition.getActiveInput(each.GetBaseName()), (name, each.GetBaseName())
+            assert [each.getName() for each in definition.getActiveOutputs()] == ["out"]
+
+
+def test_a_stack_comes_back(painted: vt.Stack, tmp_path: Path) -> None:
+    """Expected: the stack exactly, as text, as crate, and after another program has written it; not once a number is
+    changed."""
+    for stack in (painted, GOLD, BRUSHED):
+        path = saved(stack, tmp_path)
+        assert vt.load(path) == stack
+        layer = Sdf.Layer.OpenAsAnonymous(str(path))
+        layer.Export(str(tmp_path / "b.usdc"))
+        assert vt.imports.read(tmp_path / "b.usdc").stack == stack
+        stage = Usd.Stage.Open(layer)
+        UsdShade.Shader(stage.GetPrimAtPath("/material/surface")).CreateInput("coat_ior", Sdf.ValueTypeNames.Float).Set(
+            1.23
+        )
+        layer.Export(str(tmp_path / "c.usda"))
+        assert vt.imports.read(tmp_path / "c.usda").stack != stack
+
+
+def test_the_network_is_that_of_materialx(painted: vt.Stack, tmp_path: Path) -> None:
+    """Expected: by numbers and images alone, the same stack as of the document of MaterialX."""
+    for stack in (painted, GOLD, BRUSHED, PANE):
+        here, there = (
+            loosened(saved(stack, tmp_path, to, name)) for to, name in (("usd", "a.usda"), ("openpbr", "a.mtlx"))
+        )
+        found, expected = (vt.imports.read(path) for path in (here, there))
+        assert found.stack.layers == expected.stack.layers
+        assert found.left == expected.left
+
+
+def test_the_preview_keeps_what_it_has(tmp_path: Path) -> None:
+    """Expected: metal below a clearcoat of the layer's roughness; the loss of both surfaces in the file."""
+    text = vt.export(GOLD, "usd").text
+    assert "in the formulas of OpenPBR" in text and "in the formulas of UsdPreviewSurface" in text
+    made = baked.bake(GOLD, "usd")
+    assert (made.values["metallic"], made.values["clearcoat"]) == (1, 1)
+    assert made.values["clearcoatRoughness"] == pytest.approx(0.1**0.5, abs=0.01)
+    path = tmp_path / "a.usda"
+    path.write_text(
+        "\n".join(line for line in text.splitlines() if "outputs:mtlx" not in line and "velatura =" not in line)
+    )
+    found = vt.imports.read(path).stack
+    assert found.kinds == GOLD.kinds and found.source == "imported from UsdPreviewSurface"
+    assert found.flat()["layer0_alpha_u"] == pytest.approx(0.1, abs=0.01)
+    assert PROGRAM.title == "UsdPreviewSurface"
+
+
+# Layers of others -----------------------------------------------------------------------------------------------------
+
+
+def preview(stage: Any, path: str = "/Looks/Wood", **values: Any) -> Any:
+    """A material with a UsdPreviewSurface in a graph."""
+    material = UsdShade.Material.Define(stage, path)
+    shader = UsdShade.Shader.Define(stage, f"{path}/Graph/Surface")
+    UsdShade.NodeGraph.Define(stage, f"{path}/Graph")
+    shader.CreateIdAttr("UsdPreviewSurface")
+    for name, value in values.items():
+        kind = Sdf.ValueTypeNames.Color3f if isinstance(value, tuple) else Sdf.ValueTypeNames.Float
+        kind = Sdf.ValueTypeNames.Token if isinstance(value, str) else kind
+        shader.CreateInput(name, kind).Set(Gf.Vec3f(*value) if isinstance(value, tuple) else value)
+    material.CreateSurfaceOutput().ConnectToSource(shader.ConnectableAPI(), "surface")
+    return shader
+
+
+def test_a_preview_surface_is_the_stack_of_its_parameters(tmp_path: Path) -> None:
+    """Expected: paint under a clearcoat of the same index; of a metal, its colour at the normal."""
+    stage = Usd.Stage.CreateNew(str(tmp_path / "a.usda"))
+    preview(stage, diffuseColor=(0.5, 0.2, 0.1), roughness=0.4, clearcoat=1.0, clearcoatRoughness=0.1, ior=1.6)
+    preview(stage, "/Looks/Metal", diffuseColor=(0.9, 0.6, 0.3), metallic=1.0, roughness=0.5)
+    stage.GetRootLayer().Save()
+    with pytest.raises(vt.InvalidInput, match=r"has 2 materials; name one, as in a\.usda#NAME: Wood, Metal"):
+        vt.imports.read(tmp_path / "a.usda")
+    paint = vt.imports.read(f"{tmp_path}/a.usda#Wood")
+    assert paint.stack.kinds == ("dielectric", "dielectric", "diffuse") and not paint.left
+    flat = paint.stack.flat()
+    assert (flat["layer0_eta"], flat["layer0_alpha_u"], flat["layer1_alpha_u"]) == (
+        1.6,
+        *map(pytest.approx, (0.01, 0.16)),
+    )
+    metal = vt.imports.read(f"{tmp_path}/a.usda#Metal").stack
+    energy = vt.lobes(metal, 1.0).energy[0][:, 0]
+    np.testing.assert_allclose(energy, (0.9, 0.6, 0.3), rtol=0.06)  # but for light that facets lose
+
+
+@pytest.mark.parametrize(
+    ("values", "kinds"),
+    [
+        ({"opacity": 0.0}, [("dielectric", "dielectric")]),
+        ({"opacity": 0.3}, [("dielectric", "dielectric"), ("dielectric", "diffuse")]),
+        ({"opacity": 0.3, "opacityMode": "presence"}, [("dielectric", "diffuse"), ("dielectric",)]),
+        ({"opacity": 0.3, "opacityThreshold": 0.5}, [("dielectric",)]),
+        ({"opacity": 0.6, "opacityThreshold": 0.5}, [("dielectric", "diffuse")]),
+        ({"useSpecularWorkflow": 1.0, "specularColor": (0.5, 0.5, 0.5)}, [("dielectric", "diffuse")]),
+    ],
+)
+def test_opacity_lets_light_pass_or_is_coverage(tmp_path: Path, values: dict[str, Any], kinds: list[Any]) -> None:
+    """Expected: what the modes of opacity say, as panes and as nothing; in the specular workflow the colour's index."""
+    stage = Usd.Stage.CreateNew(str(tmp_path / "a.usda"))
+    preview(stage, **values)
+    stage.GetRootLayer().Save()
+    found = vt.imports.read(tmp_path / "a.usda").stack
+    assert [stack.kinds for _, stack in found.leaves()] == kinds
+    if "specularColor" in values:
+        assert vt.lobes(found, 1.0).energy[0][0, 0] == pytest.approx(0.5, rel=0.05)
+
+
+def test_images_are_read_with_their_scale_and_space(painted: vt.Stack, tmp_path: Path) -> None:
+    """Expected: colours in sRGB times the scale, one channel as it is; a transform of coordinates is listed."""
+    stage = Usd.Stage.CreateNew(str(tmp_path / "a.usda"))
+    shader = preview(stage)
+    image = UsdShade.Shader.Define(stage, "/Looks/Wood/Image")
+    image.CreateIdAttr("UsdUVTexture")
+    image.CreateInput("file", Sdf.ValueTypeNames.Asset).Set(Sdf.AssetPath("./wood @@@ 1.png"))
+    image.CreateInput("scale", Sdf.ValueTypeNames.Float4).Set(Gf.Vec4f(0.5, 0.5, 0.5, 1))
+    move = UsdShade.Shader.Define(stage, "/Looks/Wood/Move")
+    move.CreateIdAttr("UsdTransform2d")
+    image.CreateInput("st", Sdf.ValueTypeNames.Float2).ConnectToSource(move.ConnectableAPI(), "result")
+    for name, output, kind in (("diffuseColor", "rgb", "Color3f"), ("roughness", "g", "Float")):
+        made = shader.CreateInput(name, getattr(Sdf.ValueTypeNames, kind))
+        made.ConnectToSource(image.ConnectableAPI(), output)
+    stage.GetRootLayer().Save()
+    found = vt.imports.read(tmp_path / "a.usda")
+    flat = found.stack.flat()
+    albedo, rough = flat["layer1_albedo"], flat["layer0_alpha_u"]
+    assert isinstance(albedo, vt.Texture) and (albedo.channel, albedo.encoding) == ("rgb", "srgb")
+    assert isinstance(rough, vt.Texture) and (rough.channel, rough.encoding) == ("g", "linear")
+    assert albedo.texture == tmp_path / "wood @@@ 1.png"
+    assert rough.curve is not None and rough.curve[-1] == pytest.approx(0.25)
+    assert any("texcoord" in each.parameter for each in found.left)
+
+
+def test_other_layers_are_not_read(tmp_path: Path) -> None:
+    """Expected: what references, payloads and sublayers hold is left out and listed, also in variants."""
+    other = Usd.Stage.CreateNew(str(tmp_path / "other.usda"))
+    preview(other, "/Hidden", metallic=1.0)
+    other.GetRootLayer().Save()
+    stage = Usd.Stage.CreateNew(str(tmp_path / "a.usda"))
+    preview(stage)
+    stage.GetRootLayer().subLayerPaths.append("other.usda")
+    prim = stage.DefinePrim("/Model")
+    prim.GetReferences().AddReference("other.usda", "/Hidden")
+    prim.GetPayloads().AddPayload("other.usda", "/Hidden")
+    variants = prim.GetVariantSets().AddVariantSet("look")
+    variants.AddVariant("one")
+    variants.SetVariantSelection("one")
+    with variants.GetVariantEditContext():
+        prim.GetReferences().AddReference("other.usda", "/Hidden")
+    stage.GetRootLayer().Save()
+    found = vt.imports.read(tmp_path / "a.usda")
+    assert found.stack.name == "Wood"
+    assert "references 4: other layers are not read" in map(str, found.left)
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("nonsense", "cannot be read as USD: "),
+        ("#usda 1.0\n(", "cannot be read as USD: "),
+        ("#usda 1.0\n", "has no material that is read here"),
+        ('#usda 1.0\ndef Material "A" {}\n', "material A: has no surface that is read here"),
+        ('#usda 1.0\ndef Material "A" {\ntoken outputs:surface.connect = </A/S.outputs:surface>\ndef Shader "S" {\n'
+         'uniform token info:id = "Toon"\ntoken outputs:surface\n}\n}\n', "material A: its surface Toon is none of "),
+        ('#usda 1.0\ndef Material "A" (customData = {string velatura = "{[["}) {}\n', "has no surface that is read"),
+    ],
+)  # fmt: skip
+def test_other_files_are_refused_in_one_line(run: Run, tmp_path: Path, text: str, message: str) -> None:
+    path = tmp_path / "a.usda"
+    path.write_text(text)
+    status, out, said = run("import", str(path))
+    assert status == 2 and not out and said.count("\n") == 1 and message in said
+
+
+def test_without_usd_core_one_line_says_so(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    path = saved(GOLD, tmp_path)
+    monkeypatch.setitem(sys.modules, "pxr", None)
+    with pytest.raises(MissingTool, match=r'is not installed: run `.* -m pip install "velatura\[usd\]"`'):
+        vt.imports.read(path)
