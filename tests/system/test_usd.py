@@ -210,6 +210,46 @@ def test_images_are_read_with_their_scale_and_space(painted: vt.Stack, tmp_path:
     assert any("texcoord" in each.parameter for each in found.left)
 
 
+LAYERED = """#usda 1.0
+def Material "Lacquer" {
+  token outputs:mtlx:surface.connect = </Lacquer/S.outputs:out>
+  def Shader "S" {
+    uniform token info:id = "ND_surface"
+    token inputs:bsdf.connect = </Lacquer/L.outputs:out>
+    token outputs:out
+  }
+  def Shader "L" {
+    uniform token info:id = "ND_layer_bsdf"
+    token inputs:top.connect = </Lacquer/D.outputs:out>
+    token inputs:base.connect = </Lacquer/M.outputs:out>
+    token outputs:out
+  }
+  def Shader "D" {
+    uniform token info:id = "ND_dielectric_bsdf"
+    float2 inputs:roughness = (0.04, 0.04)
+    float inputs:ior = 1.6
+    token outputs:out
+  }
+  def Shader "M" {
+    uniform token info:id = "ND_lama_conductor"
+    int inputs:fresnelMode = 1
+    float3 inputs:IOR = (0.2, 0.4, 1.4)
+    float3 inputs:extinction = (3.4, 2.3, 1.8)
+    float inputs:roughness = 0.5
+    token outputs:out
+  }
+}
+"""
+
+
+def test_graphs_of_closures_are_stacks_in_usd_as_well(tmp_path: Path) -> None:
+    path = tmp_path / "a.usda"
+    path.write_text(LAYERED)
+    metal = vt.Interface(eta=(0.2, 0.4, 1.4), k=(3.4, 2.3, 1.8), alpha=0.25)
+    found = vt.imports.read(path)
+    assert found.stack.layers == (vt.Interface(eta=1.6, alpha=0.04), metal) and not found.left
+
+
 def test_other_layers_are_not_read(tmp_path: Path) -> None:
     """Expected: what references, payloads and sublayers hold is left out and listed, also in variants."""
     other = Usd.Stage.CreateNew(str(tmp_path / "other.usda"))

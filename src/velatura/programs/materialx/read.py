@@ -16,6 +16,7 @@ from velatura.programs import xml
 from velatura.programs.given import ROUNDING, Given
 from velatura.programs.gltf import read as gltf
 from velatura.programs.imported import Imported, Notes
+from velatura.programs.materialx import closures
 from velatura.programs.mixture import beside
 from velatura.programs.openpbr import read as openpbr
 from velatura.programs.parameters import Input
@@ -27,6 +28,7 @@ from velatura.programs.values import Value, changed, colour, linear, listed
 from velatura.programs.xml import Element
 from velatura.stack import Described, Texture
 from velatura.stack.schema import show, unknown
+from velatura.stack.values import cleaned
 
 SHADERS = {
     "open_pbr_surface": openpbr,
@@ -79,7 +81,7 @@ LINEAR_FROM_ACESCG = np.array(  # primaries AP1 and white of ACES to those of sR
 )
 
 
-class _Unread(Exception):
+class _Unread(ValueError):
     """Raised where an input is connected to neither a number nor a plain image."""
 
 
@@ -91,7 +93,7 @@ def materials(path: Path) -> tuple[dict[str, Callable[[Notes], Imported]], str |
         InvalidInput: it cannot be read, or is no document of MaterialX.
     """
     root = _document(path)
-    found = list(root.of("surfacematerial")) or list(root.of(*SHADERS))
+    found = list(root.of("surfacematerial")) or list(root.of(*SHADERS, *closures.SURFACES))
 
     def reader(element: Element) -> Callable[[Notes], Imported]:
         return lambda notes: of_material(element, path, notes)
@@ -202,8 +204,10 @@ class _Mixed:
 
 
 def _surface(surface: Element, path: Path, name: str, notes: Notes) -> Imported:
+    if surface.tag in closures.SURFACES:
+        return _layered(surface, path, name, notes)
     if surface.tag not in SHADERS:
-        read = f"none of {', '.join(SHADERS)}, nor a mix of these"
+        read = f"none of {', '.join((*SHADERS, *closures.SURFACES))}, nor a mix of these"
         raise InvalidInput(f"{path}: material {name}: its surface {surface.tag} is {read}")
     values: dict[str, Any] = dict(DEFAULTS.get(surface.tag, {}))
     source, renamed = SHADERS[surface.tag], RENAMED.get(surface.tag, {})
@@ -245,6 +249,23 @@ def _surface(surface: Element, path: Path, name: str, notes: Notes) -> Imported:
         values["clearcoat_gloss"] = changed(values["clearcoat_gloss"], _gloss)
     with within(f"{path}: material {name}"):
         return source.read(values, name, notes)
+
+
+def _layered(surface: Element, path: Path, name: str, notes: Notes) -> Imported:
+    """A surface that is a graph of closures."""
+    reader = _Reader(path, notes)
+
+    def value(entry: Element, parameter: str) -> Value:
+        with within(parameter, _Unread):
+            return reader.value(entry, parameter)
+
+    def node(entry: Element) -> Element:
+        with within(entry.name, _Unread):
+            return _node(entry)
+
+    with within(f"{path}: material {name}"):
+        found = closures.material(closures.Closures(value, node, str(path), notes), surface)
+    return Imported(found.model_copy(update={"name": cleaned(name), "source": "imported from MaterialX"}), notes.left)
 
 
 def _gloss(gloss: Any) -> Any:
@@ -518,7 +539,7 @@ def _literal(entry: Element) -> Value:
         return numbers[0]
     if len(numbers) not in (3, 4) or not np.isfinite(numbers).all():
         raise _Unread(f"{show(text)} is no number and no colour")
-    rgb, space = np.array(numbers[:3]), _space(entry)
+    rgb, space = np.array(numbers[:3]), "" if entry.get("type") == "vector3" else _space(entry)
     if space == "srgb_texture":
         rgb = linear(rgb)
     elif space in ("acescg", "lin_ap1", "lin_ap1_scene"):

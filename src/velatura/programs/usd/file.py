@@ -13,6 +13,7 @@ from velatura import files
 from velatura.errors import InvalidInput, needs
 from velatura.programs import embedded
 from velatura.programs.imported import Imported, Left, Notes
+from velatura.programs.materialx import closures
 from velatura.programs.materialx import read as materialx
 from velatura.programs.usd.write import Given, Shader, asset, digest, number, quoted
 from velatura.programs.xml import Element
@@ -66,7 +67,7 @@ def _blamed(path: Path) -> Iterator[None]:
     try:
         yield
     except (RuntimeError, UnicodeError) as error:
-        reason = " ".join(str(error).split())
+        reason = " ".join(str(error).partition(" : ")[2].split() or str(error).split())  # without its own places
         raise InvalidInput(f"{path}: cannot be read as USD: {reason[:MOST]}") from None
 
 
@@ -180,11 +181,23 @@ def _held(text: object, path: Path, network: list[Shader]) -> Any | None:
 # As elements of MaterialX ---------------------------------------------------------------------------------------------
 
 
+_LAMA = {f"lama_{name.removeprefix('Lama').lower()}": name for name in closures.KNOWN if name.startswith("Lama")}
+
+
+def _tag(identifier: str) -> str:
+    """The node of MaterialX that a shader is, or what it calls itself."""
+    plain = identifier.removeprefix("ND_")
+    if plain in closures.KNOWN:  # which have their type in their name
+        return plain
+    known = NODE.fullmatch(identifier)
+    plain = known[1] if known else plain
+    return _LAMA.get(plain, plain)
+
+
 def _node(shader: Shader, document: Element) -> Element:
-    known = NODE.fullmatch(shader.identifier)
     outputs = [TYPES.get(kind, kind) for kind in shader.outputs.values()]
     node = Element(
-        known[1] if known else shader.identifier,
+        _tag(shader.identifier),
         {"name": shader.name, "type": outputs[0] if len(outputs) == 1 else "multioutput"},
         document,
     )
