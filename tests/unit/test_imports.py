@@ -35,7 +35,7 @@ MAY_IMPORT = {
     "metals": "stack optics",
     "model": "stack optics tables ops renderer films media metals",
     "binding": "stack films kernel",
-    "plugins": "stack optics tables model ops kernel binding renderer reference",
+    "plugins": "stack optics tables model ops kernel binding renderer reference programs",
     "shader": "stack optics tables model ops renderer films media",
     "programs": "light stack optics renderer model reference binding kernel pictures",
     "bakes": "programs",  # and `imports`: public names

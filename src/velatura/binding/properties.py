@@ -26,7 +26,7 @@ def described(mi: Any, properties: Any, options: Collection[str]) -> tuple[Descr
     Raises:
         InvalidInput: anything that a material file would be refused for, and unknown names.
     """
-    given = {name: _given(mi, properties, name) for name in list(properties.keys()) if name not in options}
+    given = {name: value_of(mi, properties, name) for name in list(properties.keys()) if name not in options}
     objects: dict[str, Any] = {}
     stand_ins: dict[str, float] = {}
     for name, value in given.items():
@@ -81,7 +81,7 @@ def bound(
     return numbers, images
 
 
-def _given(mi: Any, properties: Any, name: str) -> Any:
+def value_of(mi: Any, properties: Any, name: str) -> Any:
     """A property as in a material file; textures, and spectra in spectral variants, unchanged."""
     value = properties[name]
     if isinstance(value, bool | int | float | str):
