@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 from editor import Server, Visit
 
-from velatura import kernel
+from velatura import kernel, scenes
 
 pytestmark = pytest.mark.skipif(bool(chromium.missing()), reason=chromium.missing())
 
@@ -56,3 +56,28 @@ def test_a_picture_is_rendered_into_the_folder_and_one_is_stopped(visit: Open, s
     dialog.get_by_role("button", name="Stop").click()
     dialog.get_by_role("button", name="Render").wait_for()
     assert [file.name for file in served.folder.iterdir()] == ["coated-brushed-gold.png"]
+
+
+def test_a_view_transform_is_seen_on_the_page_and_written_by_render(visit: Open, served: Server) -> None:
+    """Expected: the light of a furnace behind the object, half a stop above 1, has the same bytes in both."""
+    page = visit()
+    page.page.get_by_label("Light", exact=True).select_option("furnace")
+    exposure = page.page.get_by_label("Exposure, in stops", exact=True)
+    exposure.fill("0.5")
+    exposure.press("Enter")
+    dialog = page.page.locator("dialog.render")
+    page.page.get_by_role("button", name="Render", exact=True).click()
+    for label, value in (("Width", 64), ("Height", 48), ("Samples", 1)):
+        typed(page, label, value)
+    dialog.get_by_role("button", name="Close").click()
+    for name in ("soft", "aces", "agx"):
+        page.page.get_by_label("View transform").select_option(name)
+        expected = np.round(255 * scenes.tone_map([2**0.5] * 3, name))
+        page.settled()
+        page.page.evaluate("() => velatura.viewport.ready")
+        assert page.picture()[0, 0] == pytest.approx(expected, abs=1)
+    page.page.get_by_role("button", name="Render", exact=True).click()
+    dialog.get_by_role("button", name="Render").click()
+    dialog.locator("figure img").wait_for()
+    (written,) = served.folder.glob("*.png")
+    assert np.array(kernel.bitmap(written))[0, 0] == pytest.approx(expected, abs=1)

@@ -6,6 +6,7 @@ import { mock, test } from 'node:test';
 import { follow } from '../../src/velatura/editor/page/state/picture.js';
 
 const SESSION = {
+  views: [{ name: 'soft', text: '' }],
   default_model: 'velatura',
   names: { dielectrics: {}, conductors: {}, pages: {} },
   schema: { interface: { eta: { kind: 'index', default: 1.5 }, alpha: { kind: 'pair', default: 0.1 } } },

@@ -13,6 +13,7 @@ const SESSION = {
   models: ['velatura', 'belcour2018'].map((name) => ({ name, switches: { tir: ['on', 'off'] } })),
   objects: ['ball', 'sphere'],
   environments: [{ name: 'studio' }, { name: 'city' }],
+  views: [{ name: 'soft' }, { name: 'agx' }],
 };
 const MATERIAL = { name: 'Été – 漆', layers: [{ interface: { eta: 1.5, alpha: [0.1, 0.3] } }] };
 
@@ -27,7 +28,7 @@ test('an address gives back the material with what is shown', async () => {
   const found = await readFragment(fragment, SESSION);
   assert.deepEqual(found.material, MATERIAL);
   assert.deepEqual([found.model, found.switches], ['belcour2018', { tir: 'off' }]);
-  assert.deepEqual(found.view, { object: 'sphere', environment: 'city', rotation: 30, exposure: 0 });
+  assert.deepEqual(found.view, { object: 'sphere', environment: 'city', rotation: 30, exposure: 0, transform: 'soft' });
 });
 
 test('an address that was cut off is refused in words', async () => {
@@ -53,7 +54,7 @@ test('an address that holds anything else is refused in words, or without what i
 });
 
 test('an unknown model is named, and an unknown view left out', async () => {
-  const state = commands.setView(shown(), { object: 'teapot', exposure: NaN });
+  const state = commands.setView(shown(), { object: 'teapot', exposure: NaN, transform: 'filmic' });
   const { view } = await readFragment(await fragmentOf(state, MATERIAL), SESSION);
   assert.deepEqual(view, { environment: 'city', rotation: 30 });
   const other = await fragmentOf(commands.setModel(shown(), 'disney'), MATERIAL);

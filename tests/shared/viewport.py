@@ -15,8 +15,9 @@ import chromium
 import numpy as np
 
 import velatura
-from velatura.editor import messages, service
+from velatura.editor import messages, service, views
 from velatura.model import DEFAULT
+from velatura.scenes.views import DEFAULT_VIEW
 from velatura.stack import Described
 
 PAGE = Path(velatura.__file__).parent / "editor" / "page"
@@ -28,9 +29,10 @@ export * from './render/environment.js';
 export * from './render/load.js';
 """
 _OPEN = """
-() => {
+(displayed) => {
   window.viewport = new page.Viewport(document.querySelector('canvas'), {
     call: (verb, body) => window.answer(verb, body),
+    displayed,
     onError: (error) => console.error(error.stack),
   });
 }
@@ -117,7 +119,7 @@ def stage(width: int, height: int, exports: str = "") -> Iterator[Stage]:
                 f"<canvas width={width} height={height} style='width:{width}px;height:{height}px'></canvas>"
             )
             page.add_script_tag(content=script(_ENTRY + exports))
-            page.evaluate(_OPEN)
+            page.evaluate(_OPEN, views.printed(DEFAULT_VIEW))
             yield opened
         finally:
             browser.close()

@@ -364,7 +364,7 @@ def test_passes_add_up(spp: int, pixels: int) -> None:
 def test_tone_mapping_is_srgb_below_the_knee_and_never_reaches_white() -> None:
     """Rationale: sRGB encodes linear 0.214041 as 0.5 (IEC 61966-2-1)."""
     assert scenes.tone_map([0.0, 0.214041, 0.0031308]) == pytest.approx([0.0, 0.5, 0.04045], abs=1e-5)
-    steps = scenes.tone_map(np.linspace(0.0, 5.0, 5001))
+    steps = scenes.tone_map(np.linspace([0.0] * 3, [5.0] * 3, 5001))[:, 0]
     assert np.all(np.diff(steps) > 0.0) and steps[-1] < 1.0
     assert np.max(np.diff(steps[600:])) < 2e-3  # no jump at the knee
     assert scenes.tone_map([-1.0, np.nan, 1e9]) == pytest.approx([0.0, 0.0, 1.0])
@@ -374,6 +374,15 @@ def test_a_png_holds_the_tone_mapped_picture(tmp_path: Path, mi: Any) -> None:
     image = np.random.default_rng(0).uniform(0.0, 2.0, (5, 7, 3)).astype(np.float32)
     scenes.write_image(image, tmp_path / "a.PNG")
     assert np.array_equal(mi.Bitmap(str(tmp_path / "a.PNG")), np.round(255.0 * scenes.tone_map(image)))
+
+
+def test_a_png_takes_a_view_transform_and_another_name_is_one_line(tmp_path: Path, mi: Any) -> None:
+    image = np.random.default_rng(0).uniform(0.0, 2.0, (5, 7, 3)).astype(np.float32)
+    scenes.write_image(image, tmp_path / "a.png", view="agx")
+    assert np.array_equal(mi.Bitmap(str(tmp_path / "a.png")), np.round(255.0 * scenes.tone_map(image, "agx")))
+    with pytest.raises(InvalidInput, match="view: must be one of soft, srgb, agx, aces, got 'filmic'"):
+        scenes.write_image(image, tmp_path / "b.png", view="filmic")
+    assert not (tmp_path / "b.png").exists()
 
 
 def test_an_exr_holds_the_linear_picture(tmp_path: Path, mi: Any) -> None:

@@ -78,8 +78,9 @@ def calls(monkeypatch: pytest.MonkeyPatch) -> dict[str, Any]:
         return np.zeros((6, 8, 3))
 
     scenes = SimpleNamespace(
+        check_view=lambda view: seen.update(view=view),
         check_writable=lambda path: seen.update(checked=path),
-        write_image=lambda image, path: path.write_text(f"picture {image.shape}"),
+        write_image=lambda image, path, view: path.write_text(f"picture {image.shape}"),
     )
     model = SimpleNamespace(DEFAULT="plain", SWITCHES={"tir": ("off", "published"), "map": ("belcour", "weier")})
     monkeypatch.setitem(sys.modules, "velatura.model", model)

@@ -45,7 +45,7 @@ MAY_IMPORT = {
     "light": "renderer",
     "reference": "light stack optics ops kernel binding renderer films media metals",
     "checks": "renderer kernel",
-    "scenes": "renderer kernel",
+    "scenes": "ops renderer kernel",
     "comparison": "light stack optics model reference renderer checks scenes api kernel bakes",
     "benchmark": "light stack optics model reference checks comparison api kernel bakes programs",
     "progress": "",

@@ -35,6 +35,9 @@ def render(
     spp: Annotated[int, typer.Option(min=1, max=2**20, metavar="N", help="Samples per pixel.")] = 64,
     size: Annotated[str | None, typer.Option(metavar="N|WxH", help="Pixels; default: 512, or the scene's own.")] = None,
     seed: Annotated[int, typer.Option(min=0, max=2**31 - 1, metavar="N", help="Seed of the random numbers.")] = 0,
+    view: Annotated[
+        str, typer.Option(metavar="NAME", help="How a PNG shows light: soft (highlights), srgb (cut off), agx, aces.")
+    ] = "soft",
     settings: options.Settings = None,
 ) -> None:
     """Render a picture of a material."""
@@ -46,13 +49,14 @@ def render(
     from velatura import scenes
 
     scenes.check_writable(path)
+    scenes.check_view(view)
 
     # Render, then write the finished picture in one go
     start = time.perf_counter()
     stage: dict[str, Any] = {"scene": scene, "env": env, "spp": spp, "size": pixels, "seed": seed}
     with progress.bar(f"Rendering {path.name}") as advance:
         image = velatura.render(stack, model=options.model_name(model), progress=advance, **stage, **switches)
-    scenes.write_image(image, path)
+    scenes.write_image(image, path, view)
     height, width = image.shape[:2]
     print(f"{path}: {width} x {height} pixels, {spp} samples each, {time.perf_counter() - start:.1f} s")
 

@@ -89,10 +89,10 @@ def _mirror(eta: Measured, k: Measured) -> str:
     import numpy as np
 
     from velatura.optics import fresnel
-    from velatura.scenes.picture import srgb_curve
+    from velatura.scenes.views import srgb_curve
     from velatura.stack import spectrum, srgb_weights
 
     wavelengths_nm, weights = srgb_weights()
     index = (np.interp(wavelengths_nm, *spectrum(part)) for part in (eta, k))
     linear = weights @ fresnel.conductor(1.0, *index)
-    return "#" + "".join(f"{round(255 * channel):02x}" for channel in srgb_curve(linear.clip(0, 1)).tolist())
+    return "#" + "".join(f"{round(255 * channel):02x}" for channel in srgb_curve(linear).tolist())

@@ -241,6 +241,7 @@ KEYS: dict[str, Parameter] = {
     "walk": Flag("through the layers, instead of the model"),
     "transparent": Flag("the ground of a picture"),
     "denoised": Flag("the picture"),
+    "view": Words("of the view transform of a picture"),
     "exposure": Scalar("of a picture, in stops", low=-20, high=20, texturable=False),
     "seed": Whole("of the random numbers", low=1, high=2**31),
 }

@@ -21,7 +21,8 @@ from velatura.editor.messages import Answer, Body, Verb, admitting, field, mater
 from velatura.editor.shot import LIGHT, Shot, sides
 from velatura.errors import InvalidInput, MissingTool
 from velatura.model import Model
-from velatura.scenes import write_image
+from velatura.scenes import check_view, write_image
+from velatura.scenes.views import DEFAULT_VIEW
 from velatura.stack import Described
 
 LARGEST = 4096  # pixels along a side
@@ -55,9 +56,11 @@ class Renderings:
 
         A step that was made already is not made again. Of the body, beside that of `truth`: `samples` per pixel,
         `walk`, whether light walks through the layers, `transparent`, whether there is no ground, `denoised`, the
-        `exposure` of a PNG in stops, and the name of the `file`, which is numbered where it is taken.
+        `exposure` of a PNG in stops and its `view` transform, and the name of the `file`, which is numbered where it is
+        taken.
         """
         step, key, name = body.get("step", 0), field(body, "key", str), field(body, "file", str)
+        view = check_view(body.get("view", DEFAULT_VIEW))
         self.folder.place(name, WRITTEN)
         with self.lock:
             if step == 0 and key != self.key:
@@ -71,7 +74,7 @@ class Renderings:
                 return {"step": picture.step, "steps": picture.steps}
             self.key, self.picture = "", None
             stops = body.get("exposure", 0.0) if name.lower().endswith(".png") else 0.0
-            return {"file": self._written(name, 2.0**stops * picture.image())}
+            return {"file": self._written(name, 2.0**stops * picture.image(), view)}
 
     def _begun(self, body: Body) -> Picture:
         environment = body.get("environment", "studio")
@@ -85,10 +88,10 @@ class Renderings:
         shot, size = Shot.of(body, light), sides(body, LARGEST)
         return Picture(material_of(body), model_of(body), shot, size, body.get("samples", 64), kind)
 
-    def _written(self, name: str, image: NDArray[np.float32]) -> str:
+    def _written(self, name: str, image: NDArray[np.float32], view: str) -> str:
         with self.folder.writing, kernel.exclusive:
             path = self.folder.free(self.folder.place(name, WRITTEN))
-            write_image(image, path.relative_to(self.folder.path))
+            write_image(image, path.relative_to(self.folder.path), view)
         return path.name
 
 

@@ -16,7 +16,7 @@ from numpy.typing import ArrayLike
 from pydantic.fields import FieldInfo
 
 from velatura import kernel
-from velatura.editor import appearance, class_maps, exporting, films, rendering, truth, validations, wishes
+from velatura.editor import appearance, class_maps, exporting, films, rendering, truth, validations, views, wishes
 from velatura.editor.messages import (
     Answer,
     Body,
@@ -124,6 +124,7 @@ def _constants() -> Answer:
         "denoises": rendering.can_denoise(),
         "names": _names(),
         "objects": list(OBJECTS),
+        "views": views.views(),
         "environments": [{"name": name, "title": _titled(name), "url": url} for name, url in environments],
     }
 

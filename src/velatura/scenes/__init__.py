@@ -6,13 +6,14 @@ several materials side by side: `mesh(mi, OBJECTS["ball"].surface().moved((2.4, 
 
 from velatura.scenes.environments import ENVIRONMENTS, PHOTOGRAPHS, emitter
 from velatura.scenes.objects import OBJECTS
-from velatura.scenes.picture import check_writable, render, tone_map, write_image
+from velatura.scenes.picture import check_view, check_writable, render, tone_map, write_image
 from velatura.scenes.stage import mesh, scene_dict
 
 __all__ = [
     "ENVIRONMENTS",
     "OBJECTS",
     "PHOTOGRAPHS",
+    "check_view",
     "check_writable",
     "emitter",
     "mesh",

@@ -10,8 +10,9 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from velatura import files, kernel
-from velatura.errors import whole_number
+from velatura.errors import InvalidInput, whole_number
 from velatura.scenes.stage import Name, Size, blamed, scene_dict
+from velatura.scenes.views import DEFAULT_VIEW, VIEWS
 
 #: Samples (pixels x spp) of one pass: between two of them progress is reported and an interrupt is handled.
 PASS_SAMPLES = 2**20
@@ -80,28 +81,31 @@ def _passes(spp: int, pixels: int) -> list[int]:
     return [spp // count + (i < spp % count) for i in range(count)]
 
 
-def tone_map(linear: ArrayLike, knee: float = 0.7) -> NDArray[np.float64]:
-    """Linear RGB to display values in [0, 1]: a soft shoulder from `knee` to 1, then the sRGB curve.
+def tone_map(linear: ArrayLike, view: str = DEFAULT_VIEW) -> NDArray[np.float64]:
+    """Linear RGB, of shape (..., 3), to display values in [0, 1], by a view transform of `scenes.views`.
 
-    Up to the knee a picture is unchanged; above, highlights approach white without ever reaching it.
+    By default a picture is unchanged up to .7; above, highlights approach white without ever reaching it.
+
+    Raises InvalidInput for an unknown view transform.
     """
-    x = np.maximum(np.nan_to_num(np.asarray(linear, dtype=np.float64)), 0.0)
-    room = 1.0 - knee
-    x = np.where(x > knee, 1.0 - room * np.exp(-np.maximum(x - knee, 0.0) / room), x)
-    return srgb_curve(x)
+    check_view(view)
+    light = np.moveaxis(np.maximum(np.nan_to_num(np.asarray(linear, dtype=np.float64)), 0.0), -1, 0)
+    return np.stack(VIEWS[view]((light[0], light[1], light[2])), axis=-1)
 
 
-def _displayed(image: NDArray[Any]) -> NDArray[np.float64]:
+def check_view(view: str) -> str:
+    """The name of a view transform. Raises InvalidInput for another name."""
+    if view not in VIEWS:
+        raise InvalidInput(f"view: must be one of {', '.join(VIEWS)}, got {view!r}")
+    return view
+
+
+def _displayed(image: NDArray[Any], view: str) -> NDArray[np.float64]:
     """Display values of RGB, or of RGBA, whose alpha stays."""
     colours, alpha = image[..., :3], np.clip(image[..., 3:], 0.0, 1.0)
     if not alpha.size:
-        return tone_map(colours)
-    return np.concatenate([tone_map(colours / np.maximum(alpha, 1e-6)), alpha], axis=-1)
-
-
-def srgb_curve(linear: NDArray[np.floating]) -> NDArray[np.float64]:
-    """Display values of linear ones in [0, 1], by the curve of sRGB (IEC 61966-2-1)."""
-    return np.where(linear <= 0.0031308, 12.92 * linear, 1.055 * linear ** (1.0 / 2.4) - 0.055)
+        return tone_map(colours, view)
+    return np.concatenate([tone_map(colours / np.maximum(alpha, 1e-6), view), alpha], axis=-1)
 
 
 def check_writable(path: Name) -> Path:
@@ -109,17 +113,17 @@ def check_writable(path: Name) -> Path:
     return files.check_writable(path, "a picture", (".png (tone-mapped)", ".exr (linear)"))
 
 
-def write_image(image: ArrayLike, path: Name) -> None:
-    """Write linear RGB (height, width, 3), whole or not at all: `.png` tone-mapped, `.exr` linear float32; or RGBA with
-    colours that are weighed by alpha, which those of a PNG are not.
+def write_image(image: ArrayLike, path: Name, view: str = DEFAULT_VIEW) -> None:
+    """Write linear RGB (height, width, 3), whole or not at all: `.png` by a view transform, `.exr` linear float32; or
+    RGBA with colours that are weighed by alpha, which those of a PNG are not.
 
-    Raises InvalidInput where `check_writable` does.
+    Raises InvalidInput where `check_writable` does, and for an unknown view transform.
     """
-    target = check_writable(path)
+    target, view = check_writable(path), check_view(view)
     mi = kernel.mitsuba()
     formats = mi.Bitmap.FileFormat
     if target.suffix.lower() == ".png":
-        pixels: Any = np.round(255.0 * _displayed(np.asarray(image))).astype(np.uint8)
+        pixels: Any = np.round(255.0 * _displayed(np.asarray(image), view)).astype(np.uint8)
         format = formats.PNG
     else:
         pixels = np.asarray(image, dtype=np.float32)

@@ -56,7 +56,7 @@ export function mount(root, { call, lacks = nothingLacks, live, session, storage
   const messages = createMessages(update);
   const canvas = canvasOf(document);
   const viewport = viewportOf(element, canvas, {
-    ...{ call, fetch },
+    ...{ call, fetch, displayed: session.views[0].text },
     onError: (error) => messages.complain('picture', error.message),
   });
   const edits = createEdits({ store, viewport, messages });

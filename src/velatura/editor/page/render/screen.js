@@ -16,15 +16,19 @@ export class Screen {
   #device;
   #blending = null;
   #display = null;
+  #displayed = ''; // the view transform that was asked for last
   #sums = null;
 
   constructor(device) {
     this.#device = device;
   }
 
-  async compile() {
-    const texts = [blending, display];
-    [this.#blending, this.#display] = await Promise.all(texts.map((text) => this.#device.program(text)));
+  /** Compiles what it takes to show light by a view transform. */
+  async compile(displayed) {
+    this.#displayed = displayed;
+    const [shown, blended] = await Promise.all([display(displayed), blending].map((text) => this.#device.program(text)));
+    this.#blending = blended;
+    if (this.#displayed === displayed) this.#display = shown;
   }
 
   get ready() {

@@ -24,7 +24,7 @@ const defaultFetch = (address) => fetch(address);
 export class Viewport {
   canvas;
   camera = { origin: [0, 2.6, 7.2], target: [0, 1, 0], fov: 19.5 };
-  settings = { rotation: 0, exposure: 0, mode: 'single', split: 0.5, lobe: null, tiles: '' };
+  settings = { rotation: 0, exposure: 0, displayed: '', mode: 'single', split: 0.5, lobe: null, tiles: '' };
   schedule = new Schedule();
   sources = {}; // of object and light: {parts, environment, name}, from which a lost device gets them again
 
@@ -55,11 +55,12 @@ export class Viewport {
    * Raises Error, in words, where the browser cannot draw.
    *
    * @param {HTMLCanvasElement} canvas
-   * @param {{call: function, fetch?: function, files?: string, onError?: function(Error)}} options `files` is
-   *   where textures lie.
+   * @param {{call: function, displayed: string, fetch?: function, files?: string, onError?: function(Error)}} options
+   *   `displayed` is the view transform, of call("session"); `files` is where textures lie.
    */
-  constructor(canvas, { call, fetch = defaultFetch, files = '/files/', onError = console.error }) {
+  constructor(canvas, { call, displayed, fetch = defaultFetch, files = '/files/', onError = console.error }) {
     this.canvas = canvas;
+    this.settings.displayed = displayed;
     this.#services = { call, fetch, files };
     this.#onError = onError;
     this.device = new Device(canvas);
@@ -115,14 +116,18 @@ export class Viewport {
   }
 
   /**
-   * Some of {rotation (degrees), exposure (stops), mode (single, split, difference or tiles), split, lobe (its number, or
+   * Some of {rotation (degrees), exposure (stops), displayed (a view transform in GLSL), mode (single, split, difference or tiles), split, lobe (its number, or
    * null for all), tiles (names of the slots beside "a", such as "bc")}.
    */
   setView(view) {
     const before = this.settings, { width, height } = this.frame;
     if (Object.entries(view).every(([key, value]) => before[key] === value)) return;
     this.settings = { ...before, ...view };
-    const { rotation, mode, lobe, tiles } = this.settings, { frame } = this;
+    const { rotation, displayed, mode, lobe, tiles } = this.settings, { frame } = this;
+    if (displayed !== before.displayed) {
+      this.ready = this.screen.compile(displayed);
+      this.ready.then(() => this.#show(), this.#onError);
+    }
     if (lobe !== before.lobe) Object.values(this.slots).forEach((slot) => slot.setLobe(lobe));
     if (frame.width !== width || frame.height !== height) this.#fit();
     if (rotation !== before.rotation) this.#moved();
@@ -283,7 +288,7 @@ export class Viewport {
     this.slots = Object.fromEntries(SLOTS.map((name) => [name, new Slot(device, this.loader)]));
     this.coming = null;
     this.thumbnails = new Thumbnails(device, this.loader, this.screen);
-    this.ready = Promise.all([this.screen, this.gbuffer, this.slots.a].map((part) => part.compile()));
+    this.ready = Promise.all([this.screen.compile(this.settings.displayed), this.gbuffer.compile(), this.slots.a.compile()]);
   }
 
   /** Restores all data of the lost context from the page's own copies. */

@@ -13,6 +13,7 @@ const VIEW = {
   environment: 'studio',
   rotation: 0,
   exposure: 0,
+  transform: 'soft',
   mode: 'single',
   other: null,
   split: 0.5,

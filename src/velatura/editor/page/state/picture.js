@@ -4,6 +4,7 @@ import { Offline } from '../connection.js';
 import { isPaired } from './compared.js';
 import { documentOf, flat, numbersOf, pattern, stacksAsText, stateOf, treeOf, weightsOf } from './material.js';
 import { Solutions } from './solutions.js';
+import { transformOf } from './transform.js';
 
 const PAUSE = 250; // milliseconds without a change, after which Python is asked whether values are allowed
 const REST = 2; // times as long as an answer took, Python is not asked for values that are foreseen
@@ -219,7 +220,7 @@ export function follow({ store, viewport, call, lacks, session, files, onProblem
   }
 
   function update(state) {
-    const { object, environment, rotation, exposure, mode, split, lobe, other, tiles = [] } = state.view;
+    const { object, environment, rotation, exposure, transform, mode, split, lobe, other, tiles = [] } = state.view;
     const seen = { a: state };
     if (isPaired(state.view) && !other?.truth) seen.b = otherOf(state, session);
     if (mode === 'tiles') for (const { slot, kept } of tiles) seen[slot] = { ...state, ...kept };
@@ -230,6 +231,7 @@ export function follow({ store, viewport, call, lacks, session, files, onProblem
     viewport.setView({
       rotation,
       exposure,
+      displayed: transformOf(transform, session).text,
       mode,
       split,
       tiles: tiles.map(({ slot }) => slot).join(''),

@@ -2,7 +2,7 @@
 
 const MARK = '#m=';
 const MOST = 2 ** 18; // bytes of the JSON, as many as Python takes of a material's text
-const VIEW = { object: 'objects', environment: 'environments', rotation: null, exposure: null }; // what is shared of it
+const VIEW = { object: 'objects', environment: 'environments', rotation: null, exposure: null, transform: 'views' }; // what is shared of it
 
 /** What follows the address of the page to open it with what is shown now; files that were dropped are left out. */
 export async function fragmentOf(state, material) {

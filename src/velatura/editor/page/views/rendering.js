@@ -3,6 +3,7 @@
 import { html, nothing } from 'lit-html';
 import { createRef, ref } from 'lit-html/directives/ref.js';
 import { documentOf } from '../state/material.js';
+import { transformOf } from '../state/transform.js';
 import { flag, menu, numberField } from './controls.js';
 
 const BUSY = 503; // status of an answer that is late: the step is asked for again,
@@ -30,9 +31,9 @@ export function createRendering({ store, session, viewport, call, address, files
   /** The body of call("render"), of the state as it is now. */
   async function question() {
     const { model, switches, camera, view } = store.get();
-    const { object, rotation, exposure } = view, { width, height, ending, ...others } = asked;
+    const { object, rotation, exposure, transform } = view, { width, height, ending, ...others } = asked;
     const size = [width, height], environment = await files.lightOf(view.environment);
-    const shot = { object, environment, rotation, exposure, camera: camera ?? viewport.camera };
+    const shot = { object, environment, rotation, exposure, view: transformOf(transform, session).name, camera: camera ?? viewport.camera };
     return { ...others, ...shot, size, material: documentOf(store.get()), model, switches, file: files.nameOf(ending), key: `${Date.now()}` };
   }
 
@@ -84,7 +85,7 @@ export function createRendering({ store, session, viewport, call, address, files
         ${menu({
           label: 'Format of the picture',
           value: asked.ending,
-          options: [['png', 'PNG, as exposed'], ['exr', 'EXR, linear']],
+          options: [['png', 'PNG, as on the page'], ['exr', 'EXR, linear']],
           choose: (ending) => set({ ending }),
         })}
         ${flag({ label: 'Transparent ground', value: asked.transparent, choose: (transparent) => set({ transparent }) })}

@@ -5,6 +5,7 @@ import { partsOf } from '../render/slices.js';
 import { pin, putBeside, setCamera, setModel, setSwitch, setView, swap } from '../state/commands.js';
 import { isPaired, keptOf, slotBeside } from '../state/compared.js';
 import { chosenOf, enabled, layerName } from '../state/material.js';
+import { transformOf } from '../state/transform.js';
 import { capital, dial, menu, number } from './controls.js';
 
 const MODES = [
@@ -54,6 +55,15 @@ function view({ store, session, edits, picture, choose, takeEnvironment }) {
     ${choice('Light', view.environment, withOwn(known, view.environment), change('environment').set)}
     ${line('Light turned', dial({ label: 'Rotation of the light', value: view.rotation, spec: TURN, edit: change('rotation') }))}
     ${line('Exposure', number({ ...exposure, value: view.exposure, edit: change('exposure') }))}
+    ${line(
+      'Transform',
+      menu({
+        label: 'View transform',
+        value: transformOf(view.transform, session).name,
+        options: session.views.map(({ name, title }) => [name, title]),
+        choose: change('transform').set,
+      }),
+    )}
     ${line('Lobes', lobes({ store, session, picture }))}
     <div class="actions">
       <button type="button" @click=${() => store.aside(setCamera, null)}>Reset the camera</button>

@@ -1,10 +1,10 @@
-// Linear radiance as the screen shows it: exposure, a soft shoulder and the sRGB curve; two materials side by
-// side.
+// Linear radiance as the screen shows it: exposure and a view transform; two materials side by side.
 
 /** Luminance of the largest difference that the scale resolves, either way. */
 export const LARGEST_DIFFERENCE = 0.25;
 
-export const display = /* glsl */ `#version 300 es
+/** The program of a view transform, which is `displayed` in GLSL. */
+export const display = (displayed) => /* glsl */ `#version 300 es
 precision highp float;
 uniform highp sampler2D picture_a;
 uniform highp sampler2D picture_b;
@@ -19,12 +19,7 @@ vec3 radiance(sampler2D picture) {
   return exp2(exposure) * sum.rgb / max(sum.a, 1e-6);
 }
 
-vec3 tone_mapped(vec3 x) {
-  x = max(x, 0.0);
-  x = mix(x, 1.0 - 0.3 * exp(-max(x - 0.7, 0.0) / 0.3), greaterThan(x, vec3(0.7)));
-  return mix(1.055 * pow(x, vec3(1.0 / 2.4)) - 0.055, 12.92 * x, lessThanEqual(x, vec3(0.0031308)));
-}
-
+${displayed}
 void main() {
   if (difference) {
     // Blue where b is darker, red where it is brighter, white where both are the same
@@ -35,7 +30,7 @@ void main() {
     return;
   }
   bool left = gl_FragCoord.x - corner.x < split * float(textureSize(picture_a, 0).x);
-  colour = vec4(tone_mapped(left ? radiance(picture_a) : radiance(picture_b)), 1.0);
+  colour = vec4(displayed(max(left ? radiance(picture_a) : radiance(picture_b), 0.0)), 1.0);
 }
 `;
 
