@@ -77,21 +77,6 @@ def visit(tabs: Tabs, served: Server) -> Iterator[Open]:
     assert complaints == []
 
 
-def drop(page: Visit, *files: tuple[str, str | bytes], text: str = "") -> None:
-    """Drop files, or text, on the picture."""
-    given = [(name, list(data.encode() if isinstance(data, str) else data)) for name, data in files]
-    page.page.evaluate(
-        """([files, text]) => {
-          const dataTransfer = new DataTransfer();
-          for (const [name, bytes] of files) dataTransfer.items.add(new File([Uint8Array.from(bytes)], name));
-          if (text) dataTransfer.setData('text/plain', text);
-          const event = new DragEvent('drop', { dataTransfer, bubbles: true, cancelable: true });
-          document.querySelector('canvas').dispatchEvent(event);
-        }""",
-        [given, text],
-    )
-
-
 def said(page: Visit, text: str) -> None:
     page.page.locator(".messages").get_by_text(text).wait_for()
 
@@ -105,45 +90,45 @@ def button(page: Visit, name: str) -> Any:
 
 def test_materials_of_other_programs_are_dropped_and_what_is_left_is_listed(visit: Open) -> None:
     page = visit(REFUSED)
-    drop(page, ("painted.mtlx", mtlx(SURFACE.format("Painted", BLUE))))
+    page.drop(("painted.mtlx", mtlx(SURFACE.format("Painted", BLUE))))
     said(page, "Opened Painted. Not carried from painted.mtlx, or not as it was: fuzz_weight.")
     remarks = page.page.locator(".left")
     remarks.locator("summary").click()
     assert "fuzz_weight 0.2: a stack has no fibres above it" in remarks.inner_text()
     assert [layer["kind"] for layer in page.state("layers")] == ["interface", "interface", "diffuse"]
 
-    drop(page, ("gilt.xml", SCENE))
+    page.drop(("gilt.xml", SCENE))
     said(page, "Opened Gilt")
-    drop(page, ("steel.gltf", json.dumps({"asset": {"version": "2.0"}, "materials": TRIANGLE["materials"]})))
+    page.drop(("steel.gltf", json.dumps({"asset": {"version": "2.0"}, "materials": TRIANGLE["materials"]})))
     said(page, "Opened Steel")
-    drop(page, text="coated-gold")
+    page.drop(text="coated-gold")
     page.page.wait_for_function("() => velatura.store.get().layers[2]?.keys.conductor === 'Au'")
     assert remarks.count() == 0
 
-    drop(page, text="no-such-thing")
+    page.drop(text="no-such-thing")
     said(page, "no-such-thing: is not the name of a preset")
-    drop(page, ("broken.mtlx", "<materialx"))
+    page.drop(("broken.mtlx", "<materialx"))
     said(page, "broken.mtlx: ")
-    drop(page, ("empty.gltf", json.dumps({"asset": {"version": "2.0"}})))
+    page.drop(("empty.gltf", json.dumps({"asset": {"version": "2.0"}})))
     said(page, "empty.gltf: holds neither an object nor a material")
 
 
 def test_one_of_several_materials_and_an_object_or_its_material_are_asked_for(visit: Open) -> None:
     page = visit()
     ask = page.page.locator("dialog.choice")
-    drop(page, ("two.mtlx", mtlx(SURFACE.format("Blue", BLUE), SURFACE.format("Red", 'value="0.6, 0.1, 0.1"'))))
+    page.drop(("two.mtlx", mtlx(SURFACE.format("Blue", BLUE), SURFACE.format("Red", 'value="0.6, 0.1, 0.1"'))))
     ask.get_by_text("two.mtlx holds 2 materials").wait_for()
     ask.get_by_role("button", name="Red").click()
     said(page, "Opened Red")
 
-    drop(page, ("part.gltf", json.dumps(TRIANGLE)))
+    page.drop(("part.gltf", json.dumps(TRIANGLE)))
     ask.get_by_text("part.gltf holds an object and materials").wait_for()
     page.page.keyboard.press("Escape")
     assert page.state("name") == "Red"
-    drop(page, ("part.gltf", json.dumps(TRIANGLE)))
+    page.drop(("part.gltf", json.dumps(TRIANGLE)))
     ask.get_by_role("button", name="The object").click()
     page.page.wait_for_function("() => velatura.store.get().view.object === 'file:part.gltf'")
-    drop(page, ("part.gltf", json.dumps(TRIANGLE)))
+    page.drop(("part.gltf", json.dumps(TRIANGLE)))
     ask.get_by_role("button", name="A material").click()
     said(page, "Opened Steel")
     assert page.state("view.object") == "file:part.gltf"
@@ -155,7 +140,7 @@ def test_a_file_of_the_folder_is_opened_with_its_image_and_one_is_mixed_in(visit
     (served.folder / "gilt.xml").write_text(SCENE)
     page = visit()
     texture = '<image name="i" type="color3"><input name="file" type="filename" value="wood.png"/></image>'
-    drop(page, ("wood.mtlx", mtlx(texture, SURFACE.format("Wood", 'nodename="i"'))), ("wood.png", image.getvalue()))
+    page.drop(("wood.mtlx", mtlx(texture, SURFACE.format("Wood", 'nodename="i"'))), ("wood.png", image.getvalue()))
     said(page, "Opened Wood")
     assert (served.folder / "wood.png").read_bytes() == image.getvalue()
     assert page.state("layers.2.keys.albedo.texture") == "wood.png"
@@ -185,7 +170,7 @@ def test_images_of_subfolders_are_put_into_the_folder(visit: Open, served: Serve
         "textures": [{"source": 0}],
         "materials": [{"name": "Oak", "pbrMetallicRoughness": core}],
     }
-    drop(page, ("oak.gltf", json.dumps(scene)), ("wood.png", image.getvalue()))
+    page.drop(("oak.gltf", json.dumps(scene)), ("wood.png", image.getvalue()))
     said(page, "Opened Oak")
     assert (served.folder / "wood-2.png").read_bytes() == image.getvalue()
     assert '"texture":"wood-2.png"' in page.page.evaluate("JSON.stringify(velatura.store.get().layers)")
@@ -295,7 +280,7 @@ def test_light_of_ones_own_is_dropped_and_turned_on_the_picture(visit: Open, tmp
     light = np.full((8, 16, 3), 0.2, np.float32)
     light[2:4, 3:5] = 20
     vt.scenes.write_image(light, tmp_path / "lamp.exr")
-    drop(page, ("lamp.exr", (tmp_path / "lamp.exr").read_bytes()))
+    page.drop(("lamp.exr", (tmp_path / "lamp.exr").read_bytes()))
     page.page.wait_for_function("() => velatura.store.get().view.environment === 'file:lamp.exr'")
     before = page.picture()
     picture = page.page.locator("canvas").first.bounding_box()

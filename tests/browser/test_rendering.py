@@ -12,12 +12,17 @@ import chromium
 import numpy as np
 import pytest
 from editor import Server, Visit
+from matplotlib.path import Path as Polygon
+from scipy.ndimage import binary_dilation, binary_erosion
+from scipy.spatial import ConvexHull
 
 from velatura import kernel, scenes
 
 pytestmark = pytest.mark.skipif(bool(chromium.missing()), reason=chromium.missing())
 
 Open = Callable[..., Visit]
+
+EYE = (0, 2.6, 7.2)  # from which the page looks at (0, 1, 0)
 
 
 def typed(page: Visit, label: str, value: int) -> None:
@@ -81,3 +86,42 @@ def test_a_view_transform_is_seen_on_the_page_and_written_by_render(visit: Open,
     dialog.locator("figure img").wait_for()
     (written,) = served.folder.glob("*.png")
     assert np.array(kernel.bitmap(written))[0, 0] == pytest.approx(expected, abs=1)
+
+
+PYRAMID = np.array([(0, 0, 0), (1, 0, 0), (1, 1, 0), (0, 1, 0), (0.5, 0.5, 1)])
+
+
+def outline(corners: np.ndarray, width: int, height: int) -> np.ndarray:
+    """The pixels whose middle a convex body covers, seen by the camera of dropped objects."""
+    ahead = np.array([0, 1, 0]) - np.array(EYE)
+    ahead /= np.linalg.norm(ahead)
+    right = np.cross(ahead, (0, 1, 0)) / np.linalg.norm(np.cross(ahead, (0, 1, 0)))
+    away = corners - EYE
+    places = away @ np.transpose([right, np.cross(ahead, right)]) / (away @ ahead)[:, None]
+    pixels = np.array([width, height]) / 2 + places * min(width, height) / 2 / np.tan(np.radians(19.5 / 2))
+    hull = pixels[ConvexHull(pixels).vertices]
+    middles = np.stack(np.meshgrid(np.arange(width) + 0.5, np.arange(height) + 0.5), axis=-1)
+    return Polygon(hull).contains_points(middles.reshape(-1, 2)).reshape(height, width)
+
+
+def test_a_dropped_object_is_rendered(visit: Open, served: Server) -> None:
+    """Expected: the outline of a pyramid of the size that the page gives it, but for pixels of its edges."""
+    page = visit()
+    text = "".join(f"v {x} {y} {z}\n" for x, y, z in PYRAMID) + "f 4 3 2 1\nf 1 2 5\nf 2 3 5\nf 3 4 5\nf 4 1 5\n"
+    page.drop(("pyramid.obj", text))
+    page.page.wait_for_function("() => velatura.store.get().view.object === 'file:pyramid.obj'")
+    page.settled()
+    page.page.get_by_role("button", name="Render", exact=True).click()
+    dialog = page.page.locator("dialog.render")
+    for label, value in (("Width", 64), ("Height", 48), ("Samples", 4)):
+        typed(page, label, value)
+    dialog.get_by_label("Transparent ground").check()
+    dialog.get_by_role("button", name="Render").click()
+    dialog.locator("figure img").wait_for()
+    (written,) = served.folder.glob("*.png")
+    alpha = np.array(kernel.bitmap(written))[..., 3]
+    scale = 2.7 / np.sqrt(3)
+    covered = outline(scale * (PYRAMID - (0.5, 0, 0.5)), 64, 48)
+    assert 300 < covered.sum() < np.count_nonzero(alpha)
+    assert np.all(alpha[binary_erosion(covered)] == 255)
+    assert np.all(alpha[~binary_dilation(covered, iterations=2)] == 0)

@@ -160,6 +160,20 @@ class Visit:
         drawn = "({ quiet, viewport }) => quiet && !viewport.held && viewport.previewed"
         self.page.wait_for_function(f"() => ({drawn})(window.velatura)")
 
+    def drop(self, *files: tuple[str, str | bytes], text: str = "") -> None:
+        """Drop files, or text, on the picture."""
+        given = [(name, list(data.encode() if isinstance(data, str) else data)) for name, data in files]
+        self.page.evaluate(
+            """([files, text]) => {
+              const dataTransfer = new DataTransfer();
+              for (const [name, bytes] of files) dataTransfer.items.add(new File([Uint8Array.from(bytes)], name));
+              if (text) dataTransfer.setData('text/plain', text);
+              const event = new DragEvent('drop', { dataTransfer, bubbles: true, cancelable: true });
+              document.querySelector('canvas').dispatchEvent(event);
+            }""",
+            [given, text],
+        )
+
     def picture(self) -> np.ndarray:
         """The canvas as it is now, (48, 64, 3), in 0..255."""
         self.settled()

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import base64
 from pathlib import Path
 from typing import Any
 
@@ -15,6 +16,24 @@ from velatura.editor.folder import Folder
 from velatura.errors import InvalidInput
 
 BODY = {**MIRROR, "samples": 40, "file": "ball.exr"}
+
+
+def sent(**arrays: Any) -> dict[str, str]:
+    """Arrays of a mesh as the page sends them."""
+    return {key: base64.b64encode(bytes(array)).decode() for key, array in arrays.items()}
+
+
+def triangle(**others: Any) -> dict[str, str]:
+    corners = np.zeros(9, "<f4")
+    return sent(
+        **{
+            "positions": corners,
+            "normals": corners,
+            "uv": corners[:6],
+            "triangles": np.arange(3, dtype="<u4"),
+            **others,
+        }
+    )
 
 
 @pytest.fixture
@@ -59,6 +78,16 @@ def test_a_transparent_ground_has_no_plinth_and_files_are_numbered(renderings: r
     assert sorted(path.name for path in Path().iterdir()) == ["ball-2.png", "ball.png"]
 
 
+def test_a_mesh_takes_the_place_of_an_object(renderings: rendering.Renderings) -> None:
+    """Expected: that of a named object gives its picture, and normals need not be of unit length."""
+    surface = scenes.OBJECTS["sphere"].surface()
+    positions, normals, uv = (x.astype("<f4") for x in (surface.positions, 3 * surface.normals, surface.uv))
+    mesh = sent(positions=positions, normals=normals, uv=uv, triangles=surface.triangles.astype("<u4"))
+    named, _ = made(renderings, samples=4)
+    given, _ = made(renderings, samples=4, object="file:mine.obj", mesh=mesh, key="two")
+    assert given == pytest.approx(named, abs=1e-3)
+
+
 def test_a_step_that_was_made_is_not_made_again_and_another_picture_ends_it(renderings: rendering.Renderings) -> None:
     render = renderings.verbs["render"]
     body = {**BODY, "size": [512, 512], "samples": 9, "environment": "furnace"}  # four samples a step
@@ -77,6 +106,15 @@ def test_a_step_that_was_made_is_not_made_again_and_another_picture_ends_it(rend
         ({"environment": "none.exr"}, "none.exr: there is no such file"),
         ({"object": "file:mine.obj"}, "object: must be one of ball"),
         ({"size": [8, 5000]}, "size: .*4096"),
+        ({"mesh": {}}, "mesh: must have 1 to 500,000 triangles, got 0"),
+        ({"mesh": triangle(positions=b"123")}, "mesh: positions: must have 3 numbers of 4 bytes each, got 3 bytes"),
+        ({"mesh": {"uv": "no"}}, "mesh: uv: must be in base64"),
+        ({"mesh": triangle(uv=b"")}, "mesh: positions, normals and uv must be of as many vertices"),
+        (
+            {"mesh": triangle(triangles=np.array([0, 1, 3], "<u4"))},
+            "mesh: triangles: must be of vertices below 3, got 3",
+        ),
+        ({"mesh": triangle(normals=np.full(9, np.nan, "<f4"))}, "mesh: numbers must be finite and at most 10000"),
     ],
 )
 def test_a_wrong_body_is_one_line(renderings: rendering.Renderings, changes: dict[str, Any], says: str) -> None:

@@ -18,6 +18,7 @@ from typing import Any, ClassVar, TypeAlias
 import numpy as np
 from numpy.typing import ArrayLike
 
+from velatura.editor.meshes import Triangles
 from velatura.errors import InvalidInput
 from velatura.inverse.wishes import Available
 from velatura.inverse.wishes.wish import STEEPEST
@@ -231,6 +232,7 @@ KEYS: dict[str, Parameter] = {
     "version": Words("of a file"),
     "data": Words("of a file, in base64", most=2**26),
     "object": Words("that is seen"),
+    "mesh": Triangles("in the place of a named object"),
     "environment": Words("that lights it"),
     "rotation": Scalar("of the environment, degrees about y", low=-BIGGEST, high=BIGGEST, texturable=False),
     "camera": Camera("that sees it"),

@@ -54,7 +54,8 @@ class Renderings:
     def render(self, body: Body) -> Answer:
         """A step of the picture that has a `key` of the page's choice: the next `step` of `steps`, or the `file`.
 
-        A step that was made already is not made again. Of the body, beside that of `truth`: `samples` per pixel,
+        A step that was made already is not made again. Of the body, beside that of `truth`, which the first step
+        takes alone: a `mesh` in the place of the object, `samples` per pixel,
         `walk`, whether light walks through the layers, `transparent`, whether there is no ground, `denoised`, the
         `exposure` of a PNG in stops and its `view` transform, and the name of the `file`, which is numbered where it is
         taken.

@@ -11,36 +11,40 @@ from typing import Any
 from velatura import kernel
 from velatura.editor.messages import Body
 from velatura.errors import InvalidInput
+from velatura.scenes.surfaces import Mesh
 
 LIGHT = (".exr", ".hdr")  # files that light an object
+STAND_IN = "ball"  # whose surroundings a mesh has
 
 
 @dataclass(frozen=True)
 class Shot:
-    """The object, the environment and its rotation in degrees about y, and the camera."""
+    """The object, by name or as a mesh, the environment and its rotation in degrees about y, and the camera."""
 
     name: str
+    mesh: Mesh | None
     environment: str
     rotation: float
     camera: Mapping[str, Any]
 
     @classmethod
     def of(cls, body: Body, light: Path | None = None) -> Shot:
-        """That of a body: `object`, `environment`, `rotation`, `camera`; `light` is the file of an environment.
+        """That of a body: `object` or `mesh`, `environment`, `rotation`, `camera`; `light` is a file that lights it.
 
         Raises:
             InvalidInput: an unknown object or environment, or no camera.
         """
         from velatura import scenes
 
-        name, environment, camera = body.get("object"), body.get("environment", "studio"), body.get("camera")
+        mesh, environment, camera = body.get("mesh"), body.get("environment", "studio"), body.get("camera")
+        name = body.get("object") if mesh is None else STAND_IN
         if name not in scenes.OBJECTS:
             raise InvalidInput(f"object: must be one of {', '.join(scenes.OBJECTS)}, got {name!r}")
         if light is None and environment not in scenes.ENVIRONMENTS:
             raise InvalidInput(f"environment: must be one of {', '.join(scenes.ENVIRONMENTS)}, got {environment!r}")
         if camera is None:
             raise InvalidInput("camera: must be an object of fov, origin and target, got nothing")
-        return cls(name, str(light or environment), math.fmod(body.get("rotation", 0), 360), camera)
+        return cls(name, mesh, str(light or environment), math.fmod(body.get("rotation", 0), 360), camera)
 
     def scene(self, bsdf: Any, size: tuple[int, int]) -> dict[str, Any]:
         """The scene of a BSDF for `mi.load_dict`, with pixels."""
@@ -48,6 +52,8 @@ class Shot:
 
         mi = kernel.mitsuba()
         scene = scenes.scene_dict(self.name, self.environment, bsdf, size)
+        if self.mesh is not None:
+            scene["object"] = scenes.mesh(mi, self.mesh, bsdf)
         scene["light"] = scenes.emitter(mi, self.environment, self.rotation)
         scene["sensor"] |= {
             "to_world": mi.ScalarTransform4f().look_at(self.camera["origin"], self.camera["target"], [0, 1, 0]),

@@ -4,6 +4,7 @@ import { withImages } from './dropped.js';
 import { readPicture } from './render/environment.js';
 import { contentsOf, loadObject } from './render/load.js';
 import { objectOf } from './render/loader.js';
+import { buildScene } from './render/scene.js';
 import * as commands from './state/commands.js';
 import { documentOf, enabled, leavesOf } from './state/material.js';
 import { mixWith, objectionToMixing } from './state/parts.js';
@@ -147,6 +148,13 @@ export function createFiles({ store, session, call, lacks, storage, messages, ad
     upload: async (file) => (await call('texture', { file: file.name, data: await base64(file) })).file,
     /** The name of light as Python knows it: a dropped file is put into the folder. */
     lightOf: async (name) => (name.startsWith(DROPPED) ? files.upload(await dropped(name)) : name),
+    /** A dropped object as the triangles that Python takes; undefined of an object that it knows. */
+    async meshOf(name) {
+      if (!name.startsWith(DROPPED)) return undefined;
+      const { positions, normals, uv, triangles } = buildScene((await loadObject(await dropped(name))).parts);
+      const sent = Object.entries({ positions, normals, uv, triangles });
+      return Object.fromEntries(await Promise.all(sent.map(async ([key, array]) => [key, await base64(new Blob([array]))])));
+    },
     takeEnvironment: (file) =>
       messages.attempt('environment', async () => {
         readPicture(file.name, await file.arrayBuffer());

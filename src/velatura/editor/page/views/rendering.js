@@ -32,8 +32,8 @@ export function createRendering({ store, session, viewport, call, address, files
   async function question() {
     const { model, switches, camera, view } = store.get();
     const { object, rotation, exposure, transform } = view, { width, height, ending, ...others } = asked;
-    const size = [width, height], environment = await files.lightOf(view.environment);
-    const shot = { object, environment, rotation, exposure, view: transformOf(transform, session).name, camera: camera ?? viewport.camera };
+    const size = [width, height], environment = await files.lightOf(view.environment), mesh = await files.meshOf(view.object);
+    const shot = { object, mesh, environment, rotation, exposure, view: transformOf(transform, session).name, camera: camera ?? viewport.camera };
     return { ...others, ...shot, size, material: documentOf(store.get()), model, switches, file: files.nameOf(ending), key: `${Date.now()}` };
   }
 
@@ -44,7 +44,7 @@ export function createRendering({ store, session, viewport, call, address, files
     await messages.attempt('render', async () => {
       const given = await question();
       for (let answer = picture; !picture.stopped && answer.file === undefined;) {
-        answer = await call('render', { ...given, step: picture.step }).catch(async (error) => {
+        answer = await call('render', { ...given, step: picture.step, mesh: picture.step ? undefined : given.mesh }).catch(async (error) => {
           if (error.status !== BUSY) throw error;
           await new Promise((resolve) => setTimeout(resolve, PAUSE));
           return {};
@@ -61,8 +61,7 @@ export function createRendering({ store, session, viewport, call, address, files
 
   function view() {
     const problem = messages.problems.find(({ about }) => about === 'render');
-    const { model, view } = store.get();
-    const own = view.object.startsWith('file:') ? 'Objects of the page alone are not rendered by Mitsuba' : '';
+    const { model } = store.get();
     const title = session.models.find(({ name }) => name === model).title;
     const edit = (key) => ({
       move: (value) => set({ [key]: Math.round(value) }),
@@ -104,7 +103,7 @@ export function createRendering({ store, session, viewport, call, address, files
         ${
           under
             ? html`<button type="button" @click=${() => (under.stopped = true)}>Stop</button>`
-            : html`<button type="button" class="main" ?disabled=${own} title=${own} @click=${render}>Render</button>`
+            : html`<button type="button" class="main" @click=${render}>Render</button>`
         }
         <button type="button" @click=${() => dialog.value.close()}>${under ? 'Close, and go on' : 'Close'}</button>
       </div>
