@@ -125,3 +125,36 @@ def test_a_dropped_object_is_rendered(visit: Open, served: Server) -> None:
     assert 300 < covered.sum() < np.count_nonzero(alpha)
     assert np.all(alpha[binary_erosion(covered)] == 255)
     assert np.all(alpha[~binary_dilation(covered, iterations=2)] == 0)
+
+
+def test_a_turntable_is_rendered_into_frames_and_stopped(visit: Open, served: Server) -> None:
+    """Expected: an object of rotation looks the same in all frames while it turns, not where the light does."""
+    page = visit()
+    page.page.get_by_label("Object", exact=True).select_option("sphere")
+    page.settled()
+    page.page.get_by_role("button", name="Render", exact=True).click()
+    dialog = page.page.locator("dialog.render")
+    for label, value in (("Width", 32), ("Height", 24), ("Samples", 64), ("Frames", 3)):
+        typed(page, label, value)
+    dialog.get_by_role("button", name="Render").click()
+    dialog.get_by_text(
+        "3 frames, coated-brushed-gold-01.png to coated-brushed-gold-03.png, are in the folder"
+    ).wait_for()
+    dialog.get_by_label("What turns").select_option("light")
+    dialog.get_by_role("button", name="Render").click()
+    dialog.get_by_text("3 frames, coated-brushed-gold-2-01.png").wait_for()
+    frames = [np.array(kernel.bitmap(file)).astype(float) for file in sorted(served.folder.glob("*.png"))]
+    lit, turned = frames[:3], frames[3:]
+    assert max(np.mean(np.abs(frame - lit[0])) for frame in lit[1:]) < 6
+    assert min(np.mean(np.abs(frame - turned[0])) for frame in turned[1:]) > 12
+
+    # A stop leaves the frames that are finished
+    typed(page, "Frames", 999)
+    dialog.get_by_role("button", name="Render").click()
+    dialog.get_by_text("gold-3-0001.png").wait_for()
+    dialog.get_by_role("button", name="Stop").click()
+    dialog.get_by_role("button", name="Render").wait_for()
+    count = len(list(served.folder.glob("*-3-*.png")))
+    assert 0 < count < 999
+    page.page.wait_for_timeout(500)
+    assert len(list(served.folder.glob("*-3-*.png"))) == count
