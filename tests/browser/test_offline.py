@@ -283,3 +283,11 @@ def test_the_shader_that_is_exported_is_that_of_python(visit: Open) -> None:
     assert number.sub("#", text.partition("\n")[2]) == number.sub("#", wanted.partition("\n")[2])
     found, expected = ([float(x) for x in number.findall(each)] for each in (text, wanted))
     np.testing.assert_allclose(found, expected, rtol=1e-6)
+
+
+def test_a_page_that_is_opened_as_a_file_says_what_to_do(opened: Any, folder: Path) -> None:
+    """Expected: a sentence, since browsers load no modules from files."""
+    page = opened.new_page()
+    page.goto((folder / "index.html").as_uri())
+    page.get_by_role("alert").get_by_text('Run "python -m http.server" in its folder').wait_for()
+    page.close()

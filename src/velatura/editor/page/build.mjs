@@ -51,7 +51,7 @@ const carried = [...Object.keys(dependencies), 'fflate', '@pmndrs/assets']; // t
 
 const begun = Date.now() - 1000; // file systems round times
 await mkdir(`${STATIC}/environments`, { recursive: true });
-await copyFile('index.html', `${STATIC}/index.html`);
+for (const name of ['index.html', 'opened.js']) await copyFile(name, `${STATIC}/${name}`);
 await cp('thumbnails', `${STATIC}/thumbnails`, { recursive: true });
 await writeFile(`${STATIC}/LICENSES.txt`, await licences(carried));
 for (const name of ENVIRONMENTS) await writeFile(`${STATIC}/environments/${name}.exr`, await environment(name));
