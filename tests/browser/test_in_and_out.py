@@ -299,3 +299,47 @@ def test_light_of_ones_own_is_dropped_and_turned_on_the_picture(visit: Open, tmp
     page.page.locator("canvas").first.press("Shift+ArrowRight")
     assert page.state("view.rotation") == pytest.approx(np.degrees(0.1), abs=0.1)
     page.settled()
+
+
+def test_a_photograph_is_dropped_beside_the_picture_and_wiped(visit: Open) -> None:
+    """Expected: its colours as they are, right of the line, in the middle of black where it is narrower, upright."""
+    page = visit()
+    page.page.get_by_label("Exposure, in stops", exact=True).fill("1")
+    page.page.get_by_label("Exposure, in stops", exact=True).press("Enter")
+    buffer = io.BytesIO()
+    halves = np.concatenate(
+        [np.full((20, 40, 3), (200, 30, 90), np.uint8), np.full((20, 40, 3), (10, 160, 60), np.uint8)]
+    )
+    imsave(buffer, halves)
+    before = page.picture()
+    page.drop(("photo.png", buffer.getvalue()))
+    said(page, "photo.png is beside the picture")
+    page.page.get_by_text("photo.png", exact=True).first.wait_for()
+    shown = page.picture()
+    assert shown[:, :28] == pytest.approx(before[:, :28], abs=2)
+    assert shown[10, 36] == pytest.approx((200, 30, 90), abs=1)
+    assert shown[38, 36] == pytest.approx((10, 160, 60), abs=1)
+    assert shown[10, 62] == pytest.approx((0, 0, 0), abs=1)
+
+    # The line is moved by keys, and by hand
+    line = page.page.get_by_role("slider", name="Where the picture is split")
+    line.press("ArrowRight")
+    box = page.page.locator("canvas").first.bounding_box()
+    at = line.bounding_box()
+    page.page.mouse.move(at["x"] + at["width"] / 2, at["y"] + at["height"] / 2)
+    page.page.mouse.down()
+    page.page.mouse.move(box["x"] + 0.9 * box["width"], at["y"] + at["height"] / 2, steps=4)
+    page.page.mouse.up()
+    assert page.picture()[10, 36] == pytest.approx(before[10, 36], abs=2)
+
+    # It outlives the page, and a difference is one of materials
+    page.page.reload()
+    page.ready()
+    assert page.state("view.other.title") == "photo.png"
+    page.page.get_by_label("Compare", exact=True).select_option("difference")
+    assert page.state("view.other.model")
+    page.page.get_by_label("Compare", exact=True).select_option("single")
+    assert page.picture() == pytest.approx(before, abs=2)
+
+    page.drop(("broken.png", b"no image"))
+    said(page, "broken.png: is no image that this browser reads")

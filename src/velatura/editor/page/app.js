@@ -122,7 +122,7 @@ export function mount(root, { call, lacks = nothingLacks, live, session, storage
     }),
     strip: createStrip({ store, snapshots, focus, update }),
     view: createView({ store, session, edits, picture, choose, takeEnvironment: files.takeEnvironment }),
-    model: createModel({ store, session, lacks }),
+    model: createModel({ store, session, lacks, choose, takePhotograph: files.takePhotograph }),
     onFace: () => appearance.follow(),
   });
   update();

@@ -161,6 +161,14 @@ export function createFiles({ store, session, call, lacks, storage, messages, ad
         await storage.put(file.name, file);
         store.run(commands.setView, { environment: DROPPED + file.name });
       }),
+    /** Puts a photograph on the right of a split screen. */
+    takePhotograph: (file) =>
+      messages.attempt('photograph', async () => {
+        await imageOf(file);
+        await storage.put(file.name, file);
+        store.run(commands.setView, { mode: 'split', other: { photograph: DROPPED + file.name, title: file.name } });
+        messages.say(`${file.name} is beside the picture. An image becomes a texture where it is dropped on a value.`);
+      }),
     takeObject: (file) =>
       messages.attempt('object', async () => {
         await loadObject(file);
@@ -198,10 +206,11 @@ export function createFiles({ store, session, call, lacks, storage, messages, ad
       if (isGltf(file.name)) return files.takeGltf(file);
       if (isForeign(file.name)) return files.readFile(file);
       if (/\.obj$/i.test(file.name)) return files.takeObject(file);
+      if (/\.(png|jpe?g|webp|avif)$/i.test(file.name)) return files.takePhotograph(file);
       return messages.complain(
         'drop',
-        `${file.name}: drop a material (.yaml, .json, ${FOREIGN.join(', ')}), light (.hdr, .exr) or an object (.glb, .gltf, .obj) here,` +
-          ' a texture on its value',
+        `${file.name}: drop a material (.yaml, .json, ${FOREIGN.join(', ')}), light (.hdr, .exr), an object (.glb, .gltf, .obj) or a` +
+          ' photograph (.png, .jpg) here, a texture on its value',
         { passing: true },
       );
     },
@@ -213,6 +222,7 @@ export function createFiles({ store, session, call, lacks, storage, messages, ad
       const { parts } = objectOf(await call('object', { name: session.objects[0] }));
       return loadObject(await dropped(name), parts.filter(({ role }) => role !== 'object'));
     },
+    photograph: async (name) => imageOf(await dropped(name)),
     async environment(name) {
       if (!name.startsWith(DROPPED))
         return session.environments.find((known) => known.name === name)?.url ?? name;
@@ -222,6 +232,12 @@ export function createFiles({ store, session, call, lacks, storage, messages, ad
   };
   return files;
 }
+
+/** The image in a file. Raises Error in words. */
+const imageOf = (file) =>
+  createImageBitmap(file).catch(() => {
+    throw new Error(`${file.name}: is no image that this browser reads`);
+  });
 
 const isForeign = (name) => FOREIGN.some((ending) => name.toLowerCase().endsWith(ending));
 const isGltf = (name) => /\.(glb|gltf)$/i.test(name);

@@ -6,13 +6,14 @@ const FIRST = 4; // samples from which on they are shown
 const PARTS = [16, 9]; // of a picture, in which differences are summed
 const TRUSTED = 16; // samples from which on the preview shows through no more
 
-const PLAIN = { split: 1, difference: false, corner: [0, 0] }; // one picture that fills its target
+const PLAIN = { split: 1, difference: false, photographed: false, corner: [0, 0] }; // one picture that fills its target
 
 /** Whether a slot has paths enough to be judged by them alone. */
 export const isTrusted = ({ samples }) => samples >= TRUSTED;
 
 export class Screen {
   truth = null; // in the place of slot b: {width, height, data, samples, texture}
+  photograph = null; // in its place, too: {image, texture}
   #device;
   #blending = null;
   #display = null;
@@ -42,10 +43,17 @@ export class Screen {
     this.truth = truth && { ...truth, texture: texels && this.#device.texture('RGBA32F', width, height, texels) };
   }
 
+  /** Takes a photograph, an ImageBitmap, which lies in the middle of a size as large as it has room; or null. */
+  setPhotograph(image, { width, height }) {
+    this.#device.free(this.photograph?.texture);
+    this.photograph = image && { image, texture: this.#device.image(fitted(image, width, height), 'linear') };
+  }
+
   /** Draws the slots that are seen, by the settings of the view. */
   paint(slots, { mode, split, exposure }) {
     const [a, b] = this.#pictures(slots);
-    const shown = { ...PLAIN, exposure, split: mode === 'split' ? split : 1, difference: mode === 'difference' };
+    const photographed = this.photograph !== null;
+    const shown = { ...PLAIN, exposure, photographed, split: mode === 'split' ? split : 1, difference: mode === 'difference' };
     this.#device.draw(this.#display, { picture_a: a, picture_b: b, ...shown }, null);
   }
 
@@ -71,8 +79,8 @@ export class Screen {
   }
 
   #pictures(slots) {
-    const [a, b = this.truth?.texture ?? a] = slots.map((slot) => this.#textureOf(slot));
-    return [a, b];
+    const [a, b = a] = slots.map((slot) => this.#textureOf(slot));
+    return [a, this.photograph?.texture ?? this.truth?.texture ?? b];
   }
 
   /** Draws one picture as the canvas would show it. */
@@ -88,6 +96,16 @@ export class Screen {
     this.#device.draw(this.#blending, { picture: preview, sum, trust }, slot.spare);
     return slot.spare.textures[0];
   }
+}
+
+/** A canvas with an image in its middle, from the lower row on. */
+function fitted(image, width, height) {
+  const canvas = new OffscreenCanvas(width, height), context = canvas.getContext('2d');
+  const scale = Math.min(width / image.width, height / image.height), [w, h] = [scale * image.width, scale * image.height];
+  context.translate(0, height);
+  context.scale(1, -1);
+  context.drawImage(image, (width - w) / 2, (height - h) / 2, w, h);
+  return canvas;
 }
 
 /** An RGB picture as RGBA of another size, from the lower row on; pixels stay pixels. */

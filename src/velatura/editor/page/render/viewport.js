@@ -145,6 +145,13 @@ export class Viewport {
     this.#show();
   }
 
+  /** A photograph, an ImageBitmap, in the place of slot b, or null. */
+  setPhotograph(image) {
+    this.screen.setPhotograph(image, this.canvas);
+    this.#wake();
+    this.#show();
+  }
+
   setCamera(camera) {
     this.camera = { ...this.camera, ...camera };
     this.gbuffer.outdate();
@@ -293,11 +300,12 @@ export class Viewport {
 
   /** Restores all data of the lost context from the page's own copies. */
   async #restore() {
-    const { slots, truth, sources } = this;
+    const { slots, truth, sources } = this, { photograph } = this.screen;
     this.device.restore();
     this.#build();
     this.#fit();
     if (truth) this.setTruth(truth);
+    if (photograph) this.setPhotograph(photograph.image);
     await this.ready;
     for (const [name, { shader, contents, lobe }] of Object.entries(slots)) {
       this.slots[name].setLobe(lobe);
@@ -313,6 +321,7 @@ export class Viewport {
     this.gbuffer.setSize(width, height);
     for (const name of names.length > 1 ? SLOTS : PAIR) this.slots[name].setSize(width, height);
     if (this.truth) this.setTruth(this.truth);
+    if (this.screen.photograph) this.setPhotograph(this.screen.photograph.image);
   }
 
   #placeObject() {
@@ -340,7 +349,7 @@ export class Viewport {
   /** The slots that are drawn: the first, and of those beside it all that have a material. */
   #seen() {
     const { a } = this.slots, { mode } = this.settings;
-    const names = mode === 'tiles' || mode === 'single' || this.truth ? this.#names() : PAIR;
+    const names = mode === 'tiles' || mode === 'single' || this.truth || this.screen.photograph ? this.#names() : PAIR;
     return names.map((name) => this.slots[name]).filter((slot) => slot === a || slot.shader);
   }
 

@@ -6,6 +6,9 @@ const BESIDE = ['b', 'c', 'd']; // slots of the viewport
 /** Whether a view compares the material with one other, over the whole picture. */
 export const isPaired = ({ mode }) => mode === 'split' || mode === 'difference';
 
+/** Whether the other one is a material too, and not the truth or a photograph. */
+export const isOfMaterials = (view) => isPaired(view) && !view.other?.truth && !view.other?.photograph;
+
 /** What is kept of a state, to go back to it or to put it beside others. */
 export const keptOf = (state) => Object.fromEntries(KEPT.map((key) => [key, state[key]]));
 

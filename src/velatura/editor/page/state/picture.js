@@ -1,7 +1,7 @@
 // Keeps the pictures in step with the state: values go straight to the viewport, shapes over Python.
 
 import { Offline } from '../connection.js';
-import { isPaired } from './compared.js';
+import { isOfMaterials, isPaired } from './compared.js';
 import { documentOf, flat, numbersOf, pattern, stacksAsText, stateOf, treeOf, weightsOf } from './material.js';
 import { Solutions } from './solutions.js';
 import { transformOf } from './transform.js';
@@ -222,7 +222,7 @@ export function follow({ store, viewport, call, lacks, session, files, onProblem
   function update(state) {
     const { object, environment, rotation, exposure, transform, mode, split, lobe, other, tiles = [] } = state.view;
     const seen = { a: state };
-    if (isPaired(state.view) && !other?.truth) seen.b = otherOf(state, session);
+    if (isOfMaterials(state.view)) seen.b = otherOf(state, session);
     if (mode === 'tiles') for (const { slot, kept } of tiles) seen[slot] = { ...state, ...kept };
     for (const [name, slot] of Object.entries(slots)) {
       if (seen[name]) slot.follow(seen[name]);
@@ -243,6 +243,8 @@ export function follow({ store, viewport, call, lacks, session, files, onProblem
       viewport.setCamera(store.get().camera ?? home);
     });
     once('environment', environment, async (name) => viewport.setEnvironment(await files.environment(name)));
+    const beside = isPaired(state.view) && other?.photograph;
+    once('photograph', beside || null, async (name) => viewport.setPhotograph(name && (await files.photograph(name))));
     const camera = state.camera ?? home;
     if (camera && !isSame(camera, viewport.camera)) viewport.setCamera(camera);
   }

@@ -3,7 +3,7 @@
 import { html, nothing, render } from 'lit-html';
 import { Slices, radians } from '../render/slices.js';
 import { setView } from '../state/commands.js';
-import { isPaired } from '../state/compared.js';
+import { isOfMaterials } from '../state/compared.js';
 import { chosenOf, chosenPart, enabled, layerName } from '../state/material.js';
 import './inspector.css';
 import { chart, valueAt } from './plots/chart.js';
@@ -56,7 +56,7 @@ export function mountInspector(element, { store, session, viewport, call, lacks,
       cursor,
       onCursor: setCursor,
     });
-  const isCompared = () => isPaired(store.get().view) && !store.get().view.other?.truth;
+  const isCompared = () => isOfMaterials(store.get().view);
   /** The number of a lobe among those of all parts. */
   const numberOf = ({ shader, stack }, k) =>
     shader.parts.slice(0, shader.parts.indexOf(stack)).flatMap(({ shown }) => shown).length + k;

@@ -101,7 +101,7 @@ function lobes({ store, session, picture }) {
 /** A view of the model, and of what it is compared with. */
 export const createModel = (services) => () => model(services);
 
-function model({ store, session, lacks }) {
+function model({ store, session, lacks, choose, takePhotograph }) {
   const { model, switches, view } = store.get();
   const { switches: choices, defaults } = session.models.find(({ name }) => name === model);
   const models = session.models.map(({ name, title }) => [name, title]);
@@ -109,9 +109,14 @@ function model({ store, session, lacks }) {
   const beside = () => store.run(putBeside, keptOf(store.get()));
   const chooseMode = (mode) => {
     if (mode === 'tiles' && !view.tiles?.length) return beside();
-    return store.run(setView, { mode, ...(isPaired({ mode }) && { other: view.other ?? { model: other } }) });
+    const fits = view.other && (mode !== 'difference' || !view.other.photograph); // which is no light to subtract
+    return store.run(setView, { mode, ...(isPaired({ mode }) && { other: fits ? view.other : { model: other } }) });
   };
-  const pinned = view.other?.material ? [['', view.other.title]] : [];
+  const choosePhotograph = async () => {
+    const file = await choose('image/*');
+    if (file) takePhotograph(file);
+  };
+  const pinned = view.other?.material || view.other?.photograph ? [['', view.other.title]] : [];
   const chooseOther = (name) =>
     name && store.run(setView, { other: name === TRUTH.name ? { truth: true, title: TRUTH.title } : { model: name } });
   const compared = view.other?.truth ? TRUTH.name : pinned.length ? '' : other;
@@ -130,7 +135,7 @@ function model({ store, session, lacks }) {
       <button type="button" title="To compare what it becomes with what it is" @click=${() => store.run(pin)}>
         Pin as B
       </button>
-      <button type="button" ?disabled=${!pinned.length} @click=${() => store.run(swap)}>Swap A and B</button>
+      <button type="button" ?disabled=${!view.other?.material} @click=${() => store.run(swap)}>Swap A and B</button>
       <button
         type="button"
         title="Keeps the material, as it is now, beside what it becomes; others are put there from the history"
@@ -139,6 +144,7 @@ function model({ store, session, lacks }) {
       >
         Put beside
       </button>
+      <button type="button" title="Puts a photograph on the right of a split screen" @click=${choosePhotograph}>Photograph</button>
     </div>
     <details class="switches">
       <summary>Switches</summary>

@@ -11,6 +11,7 @@ uniform highp sampler2D picture_b;
 uniform float exposure; // stops
 uniform float split; // left of it a is shown, right of it b
 uniform bool difference;
+uniform bool photographed; // whether b is a photograph, which a screen shows as it is
 uniform vec2 corner; // of the pictures on the target, the lower left one
 out vec4 colour;
 
@@ -30,6 +31,10 @@ void main() {
     return;
   }
   bool left = gl_FragCoord.x - corner.x < split * float(textureSize(picture_a, 0).x);
+  if (photographed && !left) {
+    colour = vec4(texelFetch(picture_b, ivec2(gl_FragCoord.xy - corner), 0).rgb, 1.0);
+    return;
+  }
   colour = vec4(displayed(max(left ? radiance(picture_a) : radiance(picture_b), 0.0)), 1.0);
 }
 `;
