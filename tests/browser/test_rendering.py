@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 from editor import Server, Visit
 from matplotlib.path import Path as Polygon
-from scipy.ndimage import binary_dilation, binary_erosion
+from scipy.ndimage import binary_dilation, binary_erosion, zoom
 from scipy.spatial import ConvexHull
 
 from velatura import kernel, scenes
@@ -158,3 +158,42 @@ def test_a_turntable_is_rendered_into_frames_and_stopped(visit: Open, served: Se
     assert 0 < count < 999
     page.page.wait_for_timeout(500)
     assert len(list(served.folder.glob("*-3-*.png"))) == count
+
+
+def test_lights_are_added_placed_and_removed_and_rendered_where_the_page_has_them(visit: Open, served: Server) -> None:
+    """Expected: a light in the background covers the same pixels in both, and undo takes its values back."""
+    page = visit()
+    before = page.picture()
+    page.page.get_by_role("button", name="Add a light").click()
+    for label, value in (("azimuth", 168), ("elevation", -14), ("size", 7), ("strength", 50)):
+        field = page.page.get_by_label(f"Light 1, {label}", exact=True)
+        field.fill(str(value))
+        field.press("Enter")
+    page.page.get_by_label("Light 1, hexadecimal").fill("#ff0000")
+    page.page.get_by_label("Light 1, hexadecimal").press("Enter")
+    assert page.state("view.lights.0") == {
+        **{"azimuth": 168, "elevation": -14, "size": 7, "strength": 50},
+        "colour": [1, 0, 0],
+    }
+    red = page.picture() @ (1, -1, 0) > 150
+    assert 20 < red.sum() < 300
+
+    width, height = page.page.evaluate("[velatura.canvas.width, velatura.canvas.height]")
+    page.page.get_by_role("button", name="Render", exact=True).click()
+    dialog = page.page.locator("dialog.render")
+    for label, number in (("Width", width), ("Height", height), ("Samples", 4)):
+        typed(page, label, number)
+    dialog.get_by_role("button", name="Render").click()
+    dialog.locator("figure img").wait_for()
+    dialog.get_by_role("button", name="Close").click()
+    (written,) = served.folder.glob("*.png")
+    picture = zoom(np.array(kernel.bitmap(written)).astype(float), (48 / height, 64 / width, 1), order=1)
+    covered = picture @ (1, -1, 0) > 150
+    assert (red & covered).sum() > 0.85 * (red | covered).sum()
+
+    # Not drawn without it
+    page.page.keyboard.press("Control+z")
+    assert page.state("view.lights.0.colour") == [1, 1, 1]
+    page.page.get_by_role("button", name="Remove Light 1").click()
+    assert page.state("view.lights") == []
+    assert page.picture() == pytest.approx(before, abs=2)

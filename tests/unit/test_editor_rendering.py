@@ -14,6 +14,7 @@ from velatura import kernel, scenes
 from velatura.editor import rendering
 from velatura.editor.folder import Folder
 from velatura.errors import InvalidInput
+from velatura.scenes.environments import studio
 
 BODY = {**MIRROR, "samples": 40, "file": "ball.exr"}
 
@@ -34,6 +35,12 @@ def triangle(**others: Any) -> dict[str, str]:
             **others,
         }
     )
+
+
+def lit(picture: np.ndarray, **others: int) -> dict[str, Any]:
+    """A picture of light as the page sends it."""
+    height, width, _ = picture.shape
+    return {"width": width, "height": height, **sent(data=picture.astype("<f4")), **others}
 
 
 @pytest.fixture
@@ -88,6 +95,13 @@ def test_a_mesh_takes_the_place_of_an_object(renderings: rendering.Renderings) -
     assert given == pytest.approx(named, abs=1e-3)
 
 
+def test_a_picture_of_light_takes_the_place_of_the_environments(renderings: rendering.Renderings) -> None:
+    """Expected: that of the studio gives its picture, turned as it is."""
+    named, _ = made(renderings, samples=4, rotation=50)
+    given, _ = made(renderings, samples=4, rotation=50, environment="city", light=lit(studio()), key="two")
+    assert given == pytest.approx(named, abs=1e-3)
+
+
 def test_a_step_that_was_made_is_not_made_again_and_another_picture_ends_it(renderings: rendering.Renderings) -> None:
     render = renderings.verbs["render"]
     body = {**BODY, "size": [512, 512], "samples": 9, "environment": "furnace"}  # four samples a step
@@ -114,6 +128,9 @@ def test_a_step_that_was_made_is_not_made_again_and_another_picture_ends_it(rend
             {"mesh": triangle(triangles=np.array([0, 1, 3], "<u4"))},
             "mesh: triangles: must be of vertices below 3, got 3",
         ),
+        ({"light": {"width": 1, "height": 2}}, "light: width and height must be whole numbers from 2 to 2048"),
+        ({"light": lit(np.zeros((2, 4, 3)), width=3)}, "light: data: must be of 6 texels, got 8"),
+        ({"light": lit(np.full((2, 4, 3), -1.0))}, "light: data: must be from 0 to 1e"),
         ({"mesh": triangle(normals=np.full(9, np.nan, "<f4"))}, "mesh: numbers must be finite and at most 10000"),
     ],
 )

@@ -18,7 +18,7 @@ from typing import Any, ClassVar, TypeAlias
 import numpy as np
 from numpy.typing import ArrayLike
 
-from velatura.editor.meshes import Triangles
+from velatura.editor.arrays import Picture, Triangles
 from velatura.errors import InvalidInput
 from velatura.inverse.wishes import Available
 from velatura.inverse.wishes.wish import STEEPEST
@@ -234,6 +234,7 @@ KEYS: dict[str, Parameter] = {
     "object": Words("that is seen"),
     "mesh": Triangles("in the place of a named object"),
     "environment": Words("that lights it"),
+    "light": Picture("in the place of that of the environment"),
     "rotation": Scalar("of the environment, degrees about y", low=-BIGGEST, high=BIGGEST, texturable=False),
     "camera": Camera("that sees it"),
     "size": Size("of a picture, a map"),

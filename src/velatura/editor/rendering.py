@@ -79,14 +79,14 @@ class Renderings:
 
     def _begun(self, body: Body) -> Picture:
         environment = body.get("environment", "studio")
-        light = None
+        file = None
         if environment.lower().endswith(LIGHT):
-            light = self.folder.existing(environment, LIGHT).relative_to(self.folder.path)
+            file = self.folder.existing(environment, LIGHT).relative_to(self.folder.path)
         if body.get("denoised") and not can_denoise():
             mend = f"{sys.executable} -m pip install 'velatura[denoise]'"
             raise MissingTool(f"Open Image Denoise is missing: run `{mend}`")
         kind = Kind(*(body.get(key, False) for key in Kind._fields))
-        shot, size = Shot.of(body, light), sides(body, LARGEST)
+        shot, size = Shot.of(body, file), sides(body, LARGEST)
         return Picture(material_of(body), model_of(body), shot, size, body.get("samples", 64), kind)
 
     def _written(self, name: str, image: NDArray[np.float32], view: str) -> str:

@@ -38,7 +38,8 @@ from velatura.stack.schema import unknown
 BUG = "the editor has failed, which is a mistake in it; the terminal shows details"
 BUSY = "the editor is busy with other calls like this one; ask again later"
 
-SMALL = 2**20  # bytes of a message, and of every request but those of files and meshes
+SMALL = 2**20  # bytes of a message, and of every request but these:
+MOST_OF = {"texture": LARGEST, "import": LARGEST, "render": 2 * LARGEST, "truth": 2 * LARGEST}
 IN_MEMORY = 2**16  # bytes of a request; a larger one is kept in a file until all of it is there
 BODY_TIME, ANSWER_TIME = 60, 60  # seconds for the body of a request, and for its answer
 
@@ -109,7 +110,7 @@ def application(material: str | None, token: str) -> Guard:
             return refusal(404, f"there is no verb {name}")
         if request.headers.get("content-type", "").partition(";")[0].strip().lower() != "application/json":
             return refusal(415, "a request must say that it is application/json")
-        most = LARGEST if name in ("texture", "import", "render") else SMALL
+        most = MOST_OF.get(name, SMALL)
         with tempfile.SpooledTemporaryFile(IN_MEMORY) as body:
             try:
                 with anyio.fail_after(BODY_TIME):

@@ -8,6 +8,9 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+from numpy.typing import NDArray
+
 from velatura import kernel
 from velatura.editor.messages import Body
 from velatura.errors import InvalidInput
@@ -19,17 +22,19 @@ STAND_IN = "ball"  # whose surroundings a mesh has
 
 @dataclass(frozen=True)
 class Shot:
-    """The object, by name or as a mesh, the environment and its rotation in degrees about y, and the camera."""
+    """The object, by name or as a mesh, the environment, maybe with the light of a picture in the place of its own, its
+    rotation in degrees about y, and the camera."""
 
     name: str
     mesh: Mesh | None
     environment: str
+    light: NDArray[np.float32] | None
     rotation: float
     camera: Mapping[str, Any]
 
     @classmethod
-    def of(cls, body: Body, light: Path | None = None) -> Shot:
-        """That of a body: `object` or `mesh`, `environment`, `rotation`, `camera`; `light` is a file that lights it.
+    def of(cls, body: Body, file: Path | None = None) -> Shot:
+        """That of a body: `object` or `mesh`, `environment`, `light`, `rotation`, `camera`; `file` is an environment's.
 
         Raises:
             InvalidInput: an unknown object or environment, or no camera.
@@ -40,11 +45,13 @@ class Shot:
         name = body.get("object") if mesh is None else STAND_IN
         if name not in scenes.OBJECTS:
             raise InvalidInput(f"object: must be one of {', '.join(scenes.OBJECTS)}, got {name!r}")
-        if light is None and environment not in scenes.ENVIRONMENTS:
+        if file is None and environment not in scenes.ENVIRONMENTS:
             raise InvalidInput(f"environment: must be one of {', '.join(scenes.ENVIRONMENTS)}, got {environment!r}")
         if camera is None:
             raise InvalidInput("camera: must be an object of fov, origin and target, got nothing")
-        return cls(name, mesh, str(light or environment), math.fmod(body.get("rotation", 0), 360), camera)
+        return cls(
+            name, mesh, str(file or environment), body.get("light"), math.fmod(body.get("rotation", 0), 360), camera
+        )
 
     def scene(self, bsdf: Any, size: tuple[int, int]) -> dict[str, Any]:
         """The scene of a BSDF for `mi.load_dict`, with pixels."""
@@ -54,7 +61,7 @@ class Shot:
         scene = scenes.scene_dict(self.name, self.environment, bsdf, size)
         if self.mesh is not None:
             scene["object"] = scenes.mesh(mi, self.mesh, bsdf)
-        scene["light"] = scenes.emitter(mi, self.environment, self.rotation)
+        scene["light"] = scenes.emitter(mi, self.environment if self.light is None else self.light, self.rotation)
         scene["sensor"] |= {
             "to_world": mi.ScalarTransform4f().look_at(self.camera["origin"], self.camera["target"], [0, 1, 0]),
             "fov": self.camera["fov"],

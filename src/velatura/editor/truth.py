@@ -19,8 +19,8 @@ def truth(body: Body) -> Answer:
     """The view by random walks: `picture` (h, w, 3), linear RGB, from the upper left.
 
     Light bounces between the facets of an interface where it does in the model. Of the body: `material`, `model`,
-    `switches`, `object`, `environment`, `rotation` (degrees about y), `camera` {origin, target, fov in degrees over the
-    shorter side}, `size` [w, h], `spp`, `seed`.
+    `switches`, `object` or `mesh`, `environment`, the `light` of a picture in the place of its own, `rotation` (degrees
+    about y), `camera` {origin, target, fov in degrees over the shorter side}, `size` [w, h], `spp`, `seed`.
     """
     material, shot, size = material_of(body), Shot.of(body), sides(body, LARGEST)
     spp, seed = body.get("spp", 4), body.get("seed", 1)

@@ -45,15 +45,17 @@ SOFTBOXES = (
 )
 
 
-def emitter(mi: Any, env: str | os.PathLike[str], rotation: float = 0.0) -> dict[str, Any]:
-    """The Mitsuba emitter of an environment, y up, turned about y by degrees.
+def emitter(mi: Any, env: str | os.PathLike[str] | NDArray[np.float32], rotation: float = 0.0) -> dict[str, Any]:
+    """The Mitsuba emitter of an environment, or of an equirectangular picture, y up, turned about y by degrees.
 
     Raises:
         InvalidInput: an unknown name or an unreadable file.
     """
+    turned = mi.ScalarTransform4f().rotate([0, 1, 0], rotation)
+    if isinstance(env, np.ndarray):
+        return {"type": "envmap", "bitmap": mi.Bitmap(env), "to_world": turned}
     if env == "furnace":
         return {"type": "constant", "radiance": 1.0}
-    turned = mi.ScalarTransform4f().rotate([0, 1, 0], rotation)
     if env == "sky":
         # Mitsuba's sky has z up and W/(m2 sr nm) for a unit; the scale brings it to the studio's exposure
         sky: dict[str, Any] = {"type": "sunsky", "turbidity": 5.0, "sun_scale": 2.5, "sky_scale": 2.5}

@@ -1,4 +1,4 @@
-// Arrays of numbers as the server sends them.
+// Arrays of numbers as the server sends and takes them.
 
 const TYPES = {
   float32: Float32Array,
@@ -24,3 +24,16 @@ function bytesOf(text) {
   if (Uint8Array.fromBase64) return Uint8Array.fromBase64(text);
   return Uint8Array.from(atob(text), (letter) => letter.charCodeAt(0));
 }
+
+/** The bytes of a file, or of arrays in a Blob, in base64. */
+export async function base64(blob) {
+  const bytes = new Uint8Array(await blob.arrayBuffer());
+  if (bytes.toBase64) return bytes.toBase64();
+  let text = '';
+  for (let at = 0; at < bytes.length; at += 4096)
+    text += String.fromCharCode(...bytes.subarray(at, at + 4096));
+  return btoa(text);
+}
+
+/** A picture {width, height, data} as Python takes it. */
+export const sent = async ({ width, height, data }) => ({ width, height, data: await base64(new Blob([data])) });

@@ -1,5 +1,6 @@
 // Materials, light, objects and textures from and to files, folders and addresses.
 
+import { base64 } from './arrays.js';
 import { withImages } from './dropped.js';
 import { readPicture } from './render/environment.js';
 import { contentsOf, loadObject } from './render/load.js';
@@ -248,12 +249,4 @@ function remarks(imported) {
   const names = imported.left.slice(0, NAMED).map((line) => line.split(' ')[0]);
   const more = imported.left.length > NAMED ? ', \u2026' : '';
   return ` Not carried from ${imported.file}, or not as it was: ${names.join(', ')}${more}. Layers has the reasons.`;
-}
-
-async function base64(file) {
-  const bytes = new Uint8Array(await file.arrayBuffer());
-  let text = '';
-  for (let at = 0; at < bytes.length; at += 4096)
-    text += String.fromCharCode(...bytes.subarray(at, at + 4096));
-  return btoa(text);
 }

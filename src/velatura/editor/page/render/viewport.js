@@ -4,6 +4,7 @@ import { listen, orbited } from './camera.js';
 import { Device } from './device.js';
 import { prepare } from './environment.js';
 import { GBuffer } from './gbuffer.js';
+import { withLights } from './lights.js';
 import { Loader } from './loader.js';
 import { buildScene } from './scene.js';
 import { Bands, Schedule } from './schedule.js';
@@ -26,7 +27,7 @@ export class Viewport {
   camera = { origin: [0, 2.6, 7.2], target: [0, 1, 0], fov: 19.5 };
   settings = { rotation: 0, exposure: 0, displayed: '', mode: 'single', split: 0.5, lobe: null, tiles: '' };
   schedule = new Schedule();
-  sources = {}; // of object and light: {parts, environment, name}, from which a lost device gets them again
+  sources = { lights: [] }; // of object and light: {parts, environment, name, picture, lights}, from which a lost device gets them again
 
   // On the device, and lost with it
   device;
@@ -83,10 +84,23 @@ export class Viewport {
   /** A name that call("environment") knows, the address of an .exr or .hdr file, or {width, height, data}. */
   async setEnvironment(environment) {
     const named = typeof environment === 'string';
-    this.sources.environment = prepare(named ? await this.loader.environment(environment) : environment);
+    this.sources.picture = named ? await this.loader.environment(environment) : environment;
     this.sources.name = environment;
-    this.#placeLight();
+    this.setLights(this.sources.lights);
     if (this.sources.parts) this.#placeObject();
+  }
+
+  /** Lights, of render/lights.js, in addition to the environment. */
+  setLights(lights) {
+    this.sources.lights = lights;
+    if (!this.sources.picture) return;
+    this.sources.environment = prepare(this.lighting);
+    this.#placeLight();
+  }
+
+  /** The picture of all light: {width, height, data: linear RGB from the top}. */
+  get lighting() {
+    return withLights(this.sources.picture, this.sources.lights);
   }
 
   /** A material in a slot, "a" to "d": the answer of call("shader"), and maybe another one of call("values"). */

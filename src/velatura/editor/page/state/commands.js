@@ -14,6 +14,7 @@ const VIEW = {
   rotation: 0,
   exposure: 0,
   transform: 'soft',
+  lights: [],
   mode: 'single',
   other: null,
   split: 0.5,

@@ -7,6 +7,7 @@ import { Solutions } from './solutions.js';
 import { transformOf } from './transform.js';
 
 const PAUSE = 250; // milliseconds without a change, after which Python is asked whether values are allowed
+const NO_LIGHTS = []; // the same in all states without any
 const REST = 2; // times as long as an answer took, Python is not asked for values that are foreseen
 
 /** One material in the viewport: the state's own (`a`), that of the other model (`b`), or one beside it (`b` to `d`). */
@@ -220,7 +221,7 @@ export function follow({ store, viewport, call, lacks, session, files, onProblem
   }
 
   function update(state) {
-    const { object, environment, rotation, exposure, transform, mode, split, lobe, other, tiles = [] } = state.view;
+    const { object, environment, rotation, exposure, transform, mode, split, lobe, other, tiles = [], lights = NO_LIGHTS } = state.view;
     const seen = { a: state };
     if (isOfMaterials(state.view)) seen.b = otherOf(state, session);
     if (mode === 'tiles') for (const { slot, kept } of tiles) seen[slot] = { ...state, ...kept };
@@ -243,6 +244,7 @@ export function follow({ store, viewport, call, lacks, session, files, onProblem
       viewport.setCamera(store.get().camera ?? home);
     });
     once('environment', environment, async (name) => viewport.setEnvironment(await files.environment(name)));
+    once('lights', lights, async () => viewport.setLights(lights));
     const beside = isPaired(state.view) && other?.photograph;
     once('photograph', beside || null, async (name) => viewport.setPhotograph(name && (await files.photograph(name))));
     const camera = state.camera ?? home;

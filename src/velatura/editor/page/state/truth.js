@@ -1,6 +1,6 @@
 // The truth on the right of a split picture: Python's random walk, a few samples at a time, until there are enough.
 
-import { decode } from '../arrays.js';
+import { decode, sent } from '../arrays.js';
 import { isPaired } from './compared.js';
 import { documentOf } from './material.js';
 
@@ -30,8 +30,9 @@ export function followTruth({ store, viewport, call, onProblem }) {
     const text = (wanted = JSON.stringify(question));
     let sum = null;
     try {
+      const light = question?.lights.length ? await sent(viewport.lighting) : undefined;
       for (let seed = 1; seed <= PASSES; seed++) {
-        const { picture } = await call('truth', { ...question, spp: SAMPLES, seed });
+        const { picture } = await call('truth', { ...question, light, spp: SAMPLES, seed });
         if (text !== wanted) return;
         const { array, shape } = decode(picture);
         sum = sum ? sum.map((value, index) => value + array[index]) : array;
@@ -61,10 +62,10 @@ export function followTruth({ store, viewport, call, onProblem }) {
 
 /** What Python is asked, or null while the view does not ask for the truth. */
 function questionOf(state, { canvas, camera }) {
-  const { object, environment, rotation, other } = state.view;
+  const { object, environment, lights = [], rotation, other } = state.view;
   if (!isPaired(state.view) || !other?.truth) return null;
   const scale = Math.min(1, LONGEST / Math.max(canvas.width, canvas.height));
   const size = [canvas.width, canvas.height].map((length) => Math.max(1, Math.round(length * scale)));
   const { model, switches } = state;
-  return { material: documentOf(state), model, switches, object, environment, rotation, camera: state.camera ?? camera, size };
+  return { material: documentOf(state), model, switches, object, environment, lights, rotation, camera: state.camera ?? camera, size };
 }

@@ -2,6 +2,7 @@
 
 import { html, nothing } from 'lit-html';
 import { createRef, ref } from 'lit-html/directives/ref.js';
+import { sent } from '../arrays.js';
 import { documentOf } from '../state/material.js';
 import { transformOf } from '../state/transform.js';
 import { TURNS, frameNames, turned } from '../state/turntable.js';
@@ -36,7 +37,8 @@ export function createRendering({ store, session, viewport, call, address, files
     const { model, switches, camera, view } = store.get();
     const { object, rotation, exposure, transform } = view, { width, height, samples, walk, transparent, denoised } = asked;
     const size = [width, height], environment = await files.lightOf(view.environment), mesh = await files.meshOf(view.object);
-    const shot = { object, mesh, environment, rotation, exposure, view: transformOf(transform, session).name, camera: camera ?? viewport.camera };
+    const light = view.lights?.length ? await sent(viewport.lighting) : undefined;
+    const shot = { object, mesh, environment, light, rotation, exposure, view: transformOf(transform, session).name, camera: camera ?? viewport.camera };
     return { ...shot, size, samples, walk, transparent, denoised, material: documentOf(store.get()), model, switches };
   }
 
@@ -52,7 +54,8 @@ export function createRendering({ store, session, viewport, call, address, files
     const key = `${Date.now()}`;
     work.step = 0;
     while (!work.stopped) {
-      const answer = await call('render', { ...given, key, step: work.step, mesh: work.step ? undefined : given.mesh }).catch(async (error) => {
+      const first = work.step ? { mesh: undefined, light: undefined } : {}; // which the first step takes alone
+      const answer = await call('render', { ...given, key, step: work.step, ...first }).catch(async (error) => {
         if (error.status !== BUSY) throw error;
         await new Promise((resolve) => setTimeout(resolve, PAUSE));
         return {};

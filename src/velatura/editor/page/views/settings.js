@@ -6,7 +6,8 @@ import { pin, putBeside, setCamera, setModel, setSwitch, setView, swap } from '.
 import { isPaired, keptOf, slotBeside } from '../state/compared.js';
 import { chosenOf, enabled, layerName } from '../state/material.js';
 import { transformOf } from '../state/transform.js';
-import { capital, dial, menu, number } from './controls.js';
+import { picks } from './colour.js';
+import { capital, dial, iconButton, menu, number, numberField } from './controls.js';
 
 const MODES = [
   ['single', 'One model'],
@@ -16,6 +17,15 @@ const MODES = [
 ];
 /** What is beside the models to compare with: slow, so that it comes a few samples at a time. */
 const TRUTH = { name: 'truth', title: 'Truth (random walk)' };
+
+const MOST_LIGHTS = 8;
+const NEW_LIGHT = { azimuth: 45, elevation: 45, size: 20, strength: 10, colour: [1, 1, 1] };
+const LIGHT = [
+  ['strength', { low: 0, high: 1e6, default: NEW_LIGHT.strength }, 0.1],
+  ['azimuth', { low: -360, high: 360, unit: 'degrees', default: NEW_LIGHT.azimuth }, 1],
+  ['elevation', { low: -90, high: 90, unit: 'degrees', default: NEW_LIGHT.elevation }, 1],
+  ['size', { low: 1, high: 180, unit: 'degrees', default: NEW_LIGHT.size }, 1],
+];
 
 const TURN = { unit: 'degrees', default: 0 };
 
@@ -34,7 +44,8 @@ const choice = (label, value, options, choose) => line(label, menu({ label, valu
 export const createView = (services) => () => view(services);
 
 function view({ store, session, edits, picture, choose, takeEnvironment }) {
-  const { view } = store.get();
+  const { view } = store.get(), { lights = [] } = view;
+  const setLights = (next) => store.run(setView, { lights: next });
   const change = (key) => edits.of(`view.${key}`, (value) => [setView, { [key]: value }], 'view');
   const known = session.environments.map(({ name, title }) => [name, title]);
   /** The known options, with a dropped file if it is chosen. */
@@ -53,6 +64,7 @@ function view({ store, session, edits, picture, choose, takeEnvironment }) {
   return html`
     ${choice('Object', view.object, withOwn(objects, view.object), chooseObject)}
     ${choice('Light', view.environment, withOwn(known, view.environment), change('environment').set)}
+    ${lights.map((_, number) => light({ lights, number, edits, remove: () => setLights(lights.toSpliced(number, 1)) }))}
     ${line('Light turned', dial({ label: 'Rotation of the light', value: view.rotation, spec: TURN, edit: change('rotation') }))}
     ${line('Exposure', number({ ...exposure, value: view.exposure, edit: change('exposure') }))}
     ${line(
@@ -68,8 +80,24 @@ function view({ store, session, edits, picture, choose, takeEnvironment }) {
     <div class="actions">
       <button type="button" @click=${() => store.aside(setCamera, null)}>Reset the camera</button>
       <button type="button" @click=${chooseEnvironment}>Light from a file</button>
+      <button type="button" ?disabled=${lights.length >= MOST_LIGHTS} @click=${() => setLights([...lights, NEW_LIGHT])}>Add a light</button>
     </div>
   `;
+}
+
+/** One light of one's own: its colour and strength, where it is, and a button that takes it away. */
+function light({ lights, number, edits, remove }) {
+  const name = `Light ${number + 1}`, value = lights[number];
+  const part = (key) => edits.of(`view.lights.${number}.${key}`, (next) => [setView, { lights: lights.with(number, { ...value, [key]: next }) }], 'view');
+  const field = ([key, spec, step]) => html`<label
+    >${capital(key)} ${numberField({ label: `${name}, ${key}`, value: value[key], spec, step, edit: part(key) })}</label
+  >`;
+  return html`<div class="parameter light">
+    <span class="name">${name}</span>
+    <div class="control">${picks({ label: name, rgb: value.colour, edit: part('colour') })}</div>
+    <div class="extras">${iconButton({ label: `Remove ${name}`, icon: 'remove', act: remove })}</div>
+    <div class="pairs">${LIGHT.map(field)}</div>
+  </div>`;
 }
 
 /** One button for all lobes, and one for each alone. */

@@ -1,4 +1,4 @@
-"""Objects of the page's own as the triangles that it sends."""
+"""Arrays that the page sends: the triangles of an object, and a picture of light."""
 
 from __future__ import annotations
 
@@ -10,10 +10,12 @@ from typing import Any, ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
+from velatura.scenes.environments import BRIGHTEST
 from velatura.scenes.surfaces import Mesh
 from velatura.stack.schema import Parameter
 
 MOST = 500_000  # triangles, as many as the page draws
+WIDEST = 2048  # texels of a picture, along either side, as the page has them
 FARTHEST = 1e4  # of a position from the origin
 ARRAYS = {"positions": ("<f4", 3), "normals": ("<f4", 3), "uv": ("<f4", 2), "triangles": ("<u4", 3)}
 
@@ -39,6 +41,30 @@ class Triangles(Parameter):
         lengths = np.linalg.norm(normals, axis=1, keepdims=True)
         upwards = np.where(lengths > 0, normals / np.maximum(lengths, 1e-30), (0.0, 1.0, 0.0))
         return Mesh(positions.astype(float), upwards, uv.astype(float), triangles)
+
+
+@dataclass(frozen=True)
+class Picture(Parameter):
+    """Linear RGB from the upper left: its `width`, its `height`, and `data`, numbers as those of a mesh."""
+
+    what: ClassVar[str] = "an object of width, height and data"
+
+    def check(self, value: Any) -> NDArray[np.float32]:
+        if not isinstance(value, dict):
+            raise self.refuse(value)
+        height, width = (_side(value.get(key)) for key in ("height", "width"))
+        texels = _array(value, "data", "<f4", 3)
+        if len(texels) != height * width:
+            raise ValueError(f"data: must be of {height * width} texels, got {len(texels)}")
+        if not np.all((texels >= 0) & (texels <= BRIGHTEST)):
+            raise ValueError(f"data: must be from 0 to {BRIGHTEST:g}")
+        return texels.reshape(height, width, 3).copy()  # Mitsuba takes none that is read only
+
+
+def _side(length: Any) -> int:
+    if not isinstance(length, int) or not 2 <= length <= WIDEST:
+        raise ValueError(f"width and height must be whole numbers from 2 to {WIDEST}")
+    return length
 
 
 def _array(value: dict[str, Any], key: str, dtype: str, width: int) -> NDArray[Any]:
