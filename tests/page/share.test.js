@@ -28,7 +28,7 @@ test('an address gives back the material with what is shown', async () => {
   const found = await readFragment(fragment, SESSION);
   assert.deepEqual(found.material, MATERIAL);
   assert.deepEqual([found.model, found.switches], ['belcour2018', { tir: 'off' }]);
-  assert.deepEqual(found.view, { object: 'sphere', environment: 'city', rotation: 30, exposure: 0, transform: 'soft' });
+  assert.deepEqual(found.view, { object: 'sphere', environment: 'city', rotation: 30, exposure: 0, transform: 'soft', lights: [] });
 });
 
 test('an address that was cut off is refused in words', async () => {
@@ -56,9 +56,18 @@ test('an address that holds anything else is refused in words, or without what i
 test('an unknown model is named, and an unknown view left out', async () => {
   const state = commands.setView(shown(), { object: 'teapot', exposure: NaN, transform: 'filmic' });
   const { view } = await readFragment(await fragmentOf(state, MATERIAL), SESSION);
-  assert.deepEqual(view, { environment: 'city', rotation: 30 });
+  assert.deepEqual(view, { environment: 'city', rotation: 30, lights: [] });
   const other = await fragmentOf(commands.setModel(shown(), 'disney'), MATERIAL);
   await assert.rejects(readFragment(other, SESSION), /not known here: disney/);
+});
+
+test('lights are shared, and those that are none left out', async () => {
+  const light = { azimuth: 45, elevation: 30, size: 20, strength: 10, colour: [1, 0.5, 0] };
+  const shared = async (lights) =>
+    (await readFragment(await fragmentOf(commands.setView(shown(), { lights }), MATERIAL), SESSION)).view.lights;
+  assert.deepEqual(await shared([light]), [light]);
+  for (const wrong of [[{ ...light, size: 'wide' }], [{ ...light, strength: -1 }], [{ ...light, colour: [1] }], [null], Array(9).fill(light), 'two'])
+    assert.equal(await shared(wrong), undefined);
 });
 
 /** Storage that holds so many characters. */

@@ -1,5 +1,7 @@
 // A material in an address: after #m= its JSON, deflated, in base64url.
 
+import { areLights } from './lights.js';
+
 const MARK = '#m=';
 const MOST = 2 ** 18; // bytes of the JSON, as many as Python takes of a material's text
 const VIEW = { object: 'objects', environment: 'environments', rotation: null, exposure: null, transform: 'views' }; // what is shared of it
@@ -10,7 +12,7 @@ export async function fragmentOf(state, material) {
   const shown = Object.fromEntries(
     Object.keys(VIEW).flatMap((key) => (String(view[key]).startsWith('file:') ? [] : [[key, view[key]]])),
   );
-  const text = JSON.stringify({ material, model, switches, view: shown, camera });
+  const text = JSON.stringify({ material, model, switches, view: { ...shown, lights: view.lights }, camera });
   const bytes = await through(new CompressionStream('deflate-raw'), new TextEncoder().encode(text));
   const letters = btoa(Array.from(bytes, (byte) => String.fromCharCode(byte)).join(''));
   return MARK + letters.replace(/\+/g, '-').replace(/\//g, '_').replace(/=+$/, '');
@@ -50,7 +52,8 @@ function known(view, session) {
     if (!list) return Number.isFinite(view[key]);
     return session[list].some((entry) => (entry.name ?? entry) === view[key]);
   };
-  return Object.fromEntries(Object.entries(VIEW).filter(possible).map(([key]) => [key, view[key]]));
+  const named = Object.fromEntries(Object.entries(VIEW).filter(possible).map(([key]) => [key, view[key]]));
+  return areLights(view.lights) ? { ...named, lights: view.lights } : named;
 }
 
 const isPoint = (point) => Array.isArray(point) && point.length === 3 && point.every(Number.isFinite);

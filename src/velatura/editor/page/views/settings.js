@@ -4,6 +4,7 @@ import { html, nothing } from 'lit-html';
 import { partsOf } from '../render/slices.js';
 import { pin, putBeside, setCamera, setModel, setSwitch, setView, swap } from '../state/commands.js';
 import { isPaired, keptOf, slotBeside } from '../state/compared.js';
+import { LIGHT, MOST_LIGHTS, NEW_LIGHT } from '../state/lights.js';
 import { chosenOf, enabled, layerName } from '../state/material.js';
 import { transformOf } from '../state/transform.js';
 import { picks } from './colour.js';
@@ -17,15 +18,6 @@ const MODES = [
 ];
 /** What is beside the models to compare with: slow, so that it comes a few samples at a time. */
 const TRUTH = { name: 'truth', title: 'Truth (random walk)' };
-
-const MOST_LIGHTS = 8;
-const NEW_LIGHT = { azimuth: 45, elevation: 45, size: 20, strength: 10, colour: [1, 1, 1] };
-const LIGHT = [
-  ['strength', { low: 0, high: 1e6, default: NEW_LIGHT.strength }, 0.1],
-  ['azimuth', { low: -360, high: 360, unit: 'degrees', default: NEW_LIGHT.azimuth }, 1],
-  ['elevation', { low: -90, high: 90, unit: 'degrees', default: NEW_LIGHT.elevation }, 1],
-  ['size', { low: 1, high: 180, unit: 'degrees', default: NEW_LIGHT.size }, 1],
-];
 
 const TURN = { unit: 'degrees', default: 0 };
 
@@ -89,14 +81,14 @@ function view({ store, session, edits, picture, choose, takeEnvironment }) {
 function light({ lights, number, edits, remove }) {
   const name = `Light ${number + 1}`, value = lights[number];
   const part = (key) => edits.of(`view.lights.${number}.${key}`, (next) => [setView, { lights: lights.with(number, { ...value, [key]: next }) }], 'view');
-  const field = ([key, spec, step]) => html`<label
+  const field = ([key, { step, ...spec }]) => html`<label
     >${capital(key)} ${numberField({ label: `${name}, ${key}`, value: value[key], spec, step, edit: part(key) })}</label
   >`;
   return html`<div class="parameter light">
     <span class="name">${name}</span>
     <div class="control">${picks({ label: name, rgb: value.colour, edit: part('colour') })}</div>
     <div class="extras">${iconButton({ label: `Remove ${name}`, icon: 'remove', act: remove })}</div>
-    <div class="pairs">${LIGHT.map(field)}</div>
+    <div class="pairs">${Object.entries(LIGHT).map(field)}</div>
   </div>`;
 }
 
