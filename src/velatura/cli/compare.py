@@ -18,8 +18,8 @@ def compare(
         typer.Option(
             metavar="NAME,NAME,...",
             help=f"{options.MODELS}; default: all of these. Also weidlich_wilkie, reference, a bake (openpbr, gltf, "
-            "blender-principled, mitsuba-principled), a BSDF plugin of Mitsuba's with its defaults (principled), or an "
-            "XML file of one (mine.xml).",
+            "gltf-coat, usd, blender-principled, mitsuba-principled), a BSDF plugin of Mitsuba's with its defaults "
+            "(principled), or an XML file of one (mine.xml).",
         ),
     ] = None,
     cos: Annotated[

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import json
+import re
 from collections.abc import Mapping
 from typing import Any
 
@@ -51,7 +52,7 @@ def of_gltf(entry: Mapping[str, Any]) -> Any | None:
 
 def loosened(data: bytes) -> bytes:
     """A bake of which the parameters are read, and not the material that it holds."""
-    return data.replace(b'"digest": "', b'"digest": "-')
+    return re.sub(rb'(\\?"digest\\?": \\?")', rb"\1-", data)  # USD has it in a text
 
 
 def _values(entry: Mapping[str, Any]) -> str:
