@@ -96,7 +96,7 @@ def test_meshes_of_a_file_take_the_material(painted: vt.Stack, tmp_path: Path) -
     (tmp_path / "beside.gltf").write_text(json.dumps(document))
     found, chunk = file.read(vt.export(GOLD, "gltf", mesh=tmp_path / "beside.gltf").save(tmp_path / "out.glb")[0])
     assert chunk == data
-    assert found["accessors"] == document["accessors"] and found["asset"]["copyright"] == "mine"
+    assert found["scene"] == 0 and found["accessors"] == document["accessors"] and found["asset"]["copyright"] == "mine"
     assert [each["name"] for each in found["materials"]] == ["Gold"] and "images" not in found
     (part,) = found["meshes"][0]["primitives"]
     assert part["material"] == 0 and not part["extensions"]

@@ -48,7 +48,7 @@ def write(request: Request) -> Export:
     extensions = [*dict.fromkeys([*scene.get("extensionsUsed", ()), *document.get("extensionsUsed", ())])]
     asset = {**scene.get("asset", {}), **document["asset"]}
     document = {**document, **scene, "asset": asset, "extensionsUsed": extensions}
-    document = {key: value for key, value in document.items() if value}
+    document = {key: value for key, value in document.items() if value not in ([], {})}
     text = _json(_with_buffer(document, buffer, inline=True), indent=2) + "\n"
     return replace(made, text=text, binary={".glb": partial(_packed, document, buffer, request.folder or Path())})
 
