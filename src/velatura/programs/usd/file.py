@@ -37,6 +37,7 @@ TYPES = {
 NODE = re.compile(r"ND_(\w+?)_(?:float|integer|boolean|color[34]|vector[234]|string|surfaceshader|[BEV]DF|bsdf)\w*")
 ELSEWHERE = "other layers are not read"
 MOST = 200  # characters of a reason
+LARGEST = 2**26  # bytes of a file
 
 
 def materials(path: Path) -> tuple[dict[str, Callable[[Notes], Imported]], None]:
@@ -45,7 +46,7 @@ def materials(path: Path) -> tuple[dict[str, Callable[[Notes], Imported]], None]
     Raises:
         InvalidInput: it cannot be read, or is no layer. MissingTool: usd-core is not installed.
     """
-    files.content(path)  # which checks it, and spends its bytes
+    files.content(path, LARGEST)  # which checks it, and spends its bytes
     with needs("usd"):
         from pxr import Sdf, Usd, UsdShade
     found: dict[str, Callable[[Notes], Imported]] = {}
