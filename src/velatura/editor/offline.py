@@ -23,7 +23,7 @@ from typing import Any, NamedTuple
 
 from velatura import files
 from velatura.editor import bundle
-from velatura.editor.messages import Answer, array, document
+from velatura.editor.messages import Answer, document
 from velatura.editor.service import ENVIRONMENTS, VERBS
 from velatura.editor.shading import in_closed_form, pattern
 from velatura.errors import InvalidInput
@@ -31,7 +31,6 @@ from velatura.exports.request import headed
 from velatura.model import MODELS, Model, named
 from velatura.scenes.objects import OBJECTS
 from velatura.shader import shader
-from velatura.shader.lookups import atlas
 from velatura.stack import Stack, preset, presets
 from velatura.stack.layers import KINDS
 
@@ -45,10 +44,12 @@ _MARK = '<html lang="en">', f'<html lang="en" data-answers="{DATA}/">'
 
 
 class Made(NamedTuple):
-    """Contents of files, by their places in the folder, and the names of tables that shaders in them look up."""
+    """Contents of files, by their places in the folder; the names of tables that shaders in them look up; and the names
+    of a model and of an order of layers, with the shader of both that is exported."""
 
     contents: dict[str, bytes]
     looked_up: frozenset[str] = frozenset()
+    exported: tuple[str, str, Answer] | None = None
 
 
 class Order(NamedTuple):
@@ -157,12 +158,16 @@ def _write(
     refusals = _refusals(layers)
     put(_common(refusals, models))
     tasks = _tasks([order for order, refusal in refusals.items() if not refusal], models)
-    looked_up = set[str]()
+    looked_up, exported = set[str](), dict[str, dict[str, Answer]]()
     for done, made in enumerate(_all_made(tasks), 1):
         put(made.contents)
         looked_up |= made.looked_up
+        if made.exported:
+            model, order, answer = made.exported
+            exported.setdefault(model, {})[order] = answer
         if progress:
             progress(done, len(tasks))
+    put({f"{DATA}/glsl/{model}.pack": packed(_by_lines(answers)) for model, answers in exported.items()})
     put(_tables(looked_up))
     return sizes
 
@@ -240,11 +245,22 @@ def _shader(model: str, order: Order) -> Made:
     costs = {name: str(cost) for name, cost in written.costs.items()}
     exported = {"text": headed(written.text), "tables": ",".join(written.looked_up) or None, "costs": costs}
     names = [*written.looked_up, *_looked_up(drawn)]
-    made = {"shader": drawn, "glsl": exported}
     return Made(
-        {f"{DATA}/{verb}/{model}/{order.name}.pack": packed(answer) for verb, answer in made.items()},
+        {f"{DATA}/shader/{model}/{order.name}.pack": packed(drawn)},
         frozenset(filter(None, names)),
+        (model, order.name, exported),
     )
+
+
+def _by_lines(answers: Mapping[str, Answer]) -> Answer:
+    """Texts that have most of their lines in common: all lines, and by name each text as their numbers."""
+    numbers: dict[str, int] = {}
+
+    def numbered(text: str) -> list[int]:
+        return [numbers.setdefault(line, len(numbers)) for line in text.split("\n")]
+
+    texts = {name: {**answer, "text": numbered(answer["text"])} for name, answer in answers.items()}
+    return {"lines": list(numbers), "texts": texts}
 
 
 def _looked_up(drawn: Answer) -> list[str]:
@@ -276,9 +292,7 @@ def _coated(model: Model, name: str) -> Made:
 
 
 def _tables(names: Iterable[str]) -> dict[str, bytes]:
-    """Tables, and their texels as they lie one after another in a texture."""
-    known = {f"{DATA}/table/{name}.pack": packed(VERBS["table"]({"name": name})) for name in names}
-    return known | {f"{DATA}/texels/{name}.pack": packed({"texels": array(atlas.texels_of(name))}) for name in names}
+    return {f"{DATA}/table/{name}.pack": packed(VERBS["table"]({"name": name})) for name in names}
 
 
 def packed(answer: Any) -> bytes:

@@ -15,6 +15,14 @@ const KINDS = { metal: 'conductor', custom: 'conductor' }; // where Python's nam
 const OFFERED = new Set(['glsl']); // what is there besides verbs
 const PYTHON = 'Needs Python: velatura edit';
 
+/** The texels of a table: the channels of each node filled up to whole texels; a single one is packed (`texels_of` in Python). */
+function texelsOf({ array, shape }) {
+  const channels = shape.at(-1), size = channels === 1 ? array.length : channels, whole = 4 * Math.ceil(size / 4);
+  const found = new Float32Array((array.length / size) * whole);
+  for (let node = 0; node * size < array.length; node++) found.set(array.subarray(node * size, (node + 1) * size), node * whole);
+  return found;
+}
+
 /** A client of the files in a folder: `call(verb, body)`, and `lacks(name)`, why a verb or another thing is not there, or ''. */
 export async function connectFiles(folder) {
   const kept = new Recent(KEPT);
@@ -63,8 +71,8 @@ export async function connectFiles(folder) {
 
   /** Tables one after another, in the lines of a texture. */
   async function tables({ key }) {
-    const parts = await Promise.all(key.split(',').map((name) => load(`texels/${name}`)));
-    const texels = parts.map((part) => decode(part.texels).array);
+    const parts = await Promise.all(key.split(',').map((name) => load(`table/${name}`)));
+    const texels = parts.map(({ table }) => texelsOf(decode(table)));
     const height = Math.ceil(texels.reduce((sum, { length }) => sum + length, 0) / (4 * WIDTH));
     const array = new Float32Array(4 * WIDTH * height);
     let begin = 0;
@@ -78,11 +86,13 @@ export async function connectFiles(folder) {
   /** The shader in closed form, with the values of the material in the place of those that it was printed with. */
   async function written({ material, model, to }) {
     if (filmsOf(material)) throw refused('Films need Python: velatura edit.');
-    const { text, tables: key, costs } = await load(`${to}/${model}/${orderOf(material)}`);
+    const { lines, texts } = await load(`${to}/${model}`);
+    const { text, tables: key, costs } = texts[orderOf(material)];
     const values = flat(read(material), session);
     const put = (line, begin, place) => `${begin}${literal(values[place.replace('.', '_')], line.includes('vec3'))};`;
     const beside = key && { '.tables.bin': (await tables({ key })).texture };
-    const filled = text.replace(/^( *m\.([\w.]+) = ).*;$/gm, put);
+    const written = text.map((number) => lines[number]).join('\n');
+    const filled = written.replace(/^( *m\.([\w.]+) = ).*;$/gm, put);
     return { text: filled, ending: `.${to}`, beside: beside ?? {}, costs };
   }
 
