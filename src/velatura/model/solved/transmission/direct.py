@@ -27,7 +27,7 @@ from __future__ import annotations
 
 import operator
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, fields, is_dataclass, replace
+from dataclasses import dataclass, is_dataclass, replace
 from functools import reduce
 from itertools import accumulate
 from math import pi
@@ -554,13 +554,26 @@ def integrals(
     middle = *(bound * x for x in i.p), u, v, np.cos(rotation), np.sin(rotation)
     rays = np.tile(share, nodes[1]), np.tile(weight * (pi / nodes[1]), nodes[1])
     around = np.repeat(np.cos(phi), nodes[0]), np.repeat(np.sin(phi), nodes[0])
-    # One kernel serves both sides
-    refractions = [replace(each, sign=Number(np.ravel(each.sign)[0])) for each in transmission.refractions]
-    alone = Transmission(wider(tuple(refractions)), wider(transmission.slabs), (), (), (), False, False)
-    found, _, _ = compiled.over(_passed, (*wi, *middle), (*rays, *around), alone)
+    alone = Transmission(tuple(map(_numbered, transmission.refractions)), transmission.slabs, (), (), (), False, False)
+    found, _, _ = compiled.over(_passed, (*wi, *middle), (*rays, *around), wider(alone))
     *energy, passes = found
     count = len(energy) // 2
     return np.array(energy[:count]), np.array(energy[count:]), passes
+
+
+def _numbered(refraction: Refraction) -> Refraction:
+    """An interface for a kernel that serves both sides, and any axes of brushed interfaces."""
+
+    def number(value: Value) -> Number:
+        return Number(np.asarray(value).item())
+
+    # An index is 1 but for rounding
+    n_1, n_2, sign = map(number, (refraction.n_1, refraction.n_2, refraction.sign))
+    found = replace(refraction, n_1=n_1, n_2=n_2, sign=sign)
+    if isinstance(refraction.width, Isotropic):
+        return found
+    width = type(refraction.width)(*map(number, vars(refraction.width).values()))
+    return replace(found, roughness=Roughness(*map(number, refraction.roughness)), width=width)
 
 
 def _passed(sources: Sequence[Value], samples: Sequence[Value], transmission: Transmission) -> Found:
@@ -593,5 +606,5 @@ def wider(values: Any) -> Any:
     if isinstance(values, tuple):
         return tuple(map(wider, values))
     if is_dataclass(values) and not isinstance(values, type):
-        return replace(values, **{x.name: wider(getattr(values, x.name)) for x in fields(values)})
+        return type(values)(**{name: wider(x) for name, x in vars(values).items()})
     return values
