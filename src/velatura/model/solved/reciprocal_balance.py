@@ -22,7 +22,7 @@ from velatura.model.solved.transmission import combined, direct
 from velatura.ops import Value
 from velatura.optics.ggx import Direction
 from velatura.renderer import compiled, low_discrepancy
-from velatura.renderer.compiled import Deposit, Found
+from velatura.renderer.compiled import Colour, Deposit, Found
 from velatura.renderer.directional_grid import Curves
 
 Array = NDArray[np.floating]
@@ -60,7 +60,7 @@ def factors(
         """Demand of a reflected part with its factors."""
         s = np.sqrt(squares)
         table = Curves(s.T[closed.reshape(folded.grid.closed)], folded.grid.closed)
-        given = direct.wider(part), folded.grid, table
+        given = direct.wider(part), folded.grid, table, Colour(np.ones((len(s), 1, 1)))
         sums, largest, _ = compiled.over(_weights, (*wi, *s), u, given)
         means, usual = np.split(sums / samples, 2)
         return Demand.of(energy, ops.divide(usual, means), largest)
@@ -109,11 +109,11 @@ def _passed(wi: Direction, u: Sequence[Value], numbers: Any) -> Found:
 
 def _weights(sources: Sequence[Value], u: Sequence[Value], numbers: Any) -> Found:
     """Weights of samples of a reflected part with its factors."""
-    part, grid, factors = numbers
+    part, grid, factors, colour = numbers
     x, y, z, *here = sources
     value, wo = _sampled(part, (x, y, z), u)
     there = ops.interpolate(factors, *grid.places(wo))
-    weights = value * part.side.colour(*here) * part.side.colour(*there)
+    weights = value * colour(*here) * colour(*there)
     return Found([weights, weights * weights], [weights])
 
 
