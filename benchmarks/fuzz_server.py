@@ -30,6 +30,7 @@ import editor
 from fuzzing import server as fuzzing
 from fuzzing.hands import Hands
 
+import velatura as vt
 from velatura.editor import guard
 
 INVERSIONS = 45
@@ -37,7 +38,7 @@ LOBES = 12
 STALLED, SENT = 20, 24 * 2**20  # uploads, and bytes that each sends of its 30 MiB
 HALF_OPEN = 500
 EDITS, LOOKS = 15, 8  # between two looks at the page, and between two reloads
-HEAP_MB, GROWN_MB = 64.0, 300.0  # of the page, and of the server
+HEAP_MB, GROWN_MB = 64.0, 200.0  # of the page, and of the server
 REACH_S, REACH_MB = 1.0, 60.0  # of `list` beside inversions, and of memory for stalled uploads
 
 
@@ -145,6 +146,7 @@ def half_open(port: int, pid: int) -> list[str]:
 def edited(minutes: float, seed: int) -> list[str]:
     """Edit in the page by random hands, which look at what has become of it now and then."""
     with tempfile.TemporaryDirectory() as folder, editor.server(Path(folder)) as server, editor.browser() as opened:
+        render(server)
         visit = editor.Visit(opened.new_page(viewport={"width": 900, "height": 600}), server.entrance)
         hands, end = Hands(visit, Path(folder), seed), time.monotonic() + 60 * minutes
         memories = []
@@ -159,6 +161,14 @@ def edited(minutes: float, seed: int) -> list[str]:
         row(f"{len(hands.outcome.edits)} edits, {len(heaps)} looks", f"{len(failures)} failed; {pages}")
         grown = max(heaps) > HEAP_MB or max(memories) - memories[0] > GROWN_MB
         return failures + [f"memory grows: {pages}"] * grown
+
+
+def render(server: editor.Server) -> None:
+    """Render once, so that Mitsuba, which takes 150 MB, is there from the start."""
+    camera = {"fov": 30, "origin": [0, 2, 6], "target": [0, 1, 0]}
+    scene = {"object": "sphere", "camera": camera, "size": [32, 32], "samples": 1, "key": "1", "file": "first.png"}
+    client = fuzzing.Client(int(server.address.rpartition(":")[2].rstrip("/")), server.token)
+    client.call("render", {"material": vt.preset("coated-gold").to_dict(), **scene})
 
 
 def memory(pid: int) -> float:

@@ -37,6 +37,8 @@ Factory = Callable[[ModuleType], type]
 #: From this LLVM on, compiling `minimum` is known to work; an older one has to show it in a process of its own.
 TRUSTED_LLVM = 19
 
+MUCH = 32 << 20  # bytes of Dr.Jit at once, from which its freed memory is returned
+
 _MINIMUM = "import drjit, drjit.llvm as llvm; print(drjit.minimum(llvm.Float([1, 2]), 1.5))"
 
 _factories: dict[str, Factory] = {}
@@ -156,6 +158,19 @@ def numbers(value: Any) -> list[float]:
     value = dr.detach(value)
     channels = value if dr.is_array_v(value) and dr.depth_v(value) > 1 else [value]
     return [x for channel in channels for x in np.ravel(np.array(channel, float)).tolist()]
+
+
+def return_memory() -> None:
+    """Return to the system what Dr.Jit keeps of freed memory, if it has held `MUCH` at once since the last time.
+
+    Dr.Jit keeps all of it, by size, for what may need as much again.
+    """
+    if not _drjit.cache_info().currsize:
+        return
+    dr = _drjit()
+    if dr.detail.malloc_watermark(dr.JitBackend.LLVM) > MUCH:
+        dr.flush_malloc_cache()
+        dr.detail.malloc_clear_statistics()
 
 
 # LLVM

@@ -20,6 +20,8 @@ from velatura.errors import MissingTool
 
 OLD_LLVMS = sorted(glob.glob("/usr/lib/*/libLLVM-1[456].so"))
 
+HELD = 64 << 20  # bytes
+
 ASK_FOR_MITSUBA = """
 from velatura import kernel
 try:
@@ -203,3 +205,21 @@ def test_threads_return_to_the_limit_after_pictures(mi: Any, tmp_path: Path) -> 
         kernel.allow_pictures()
         kernel.use_threads(1)
         assert dr.thread_count() == 1
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="reads /proc")
+def test_memory_that_was_much_at_once_is_returned(mi: Any) -> None:
+    """Dr.Jit would keep all that an array had."""
+    import drjit as dr
+
+    def resident() -> int:
+        return int(Path("/proc/self/statm").read_text().split()[1]) * os.sysconf("SC_PAGE_SIZE")
+
+    kernel.return_memory()
+    array = dr.full(mi.Float, 1.0, HELD // 4)
+    dr.make_opaque(array)
+    dr.sync_thread()
+    before = resident()
+    del array
+    kernel.return_memory()
+    assert before - resident() > 0.9 * HELD

@@ -26,6 +26,7 @@ from starlette.staticfiles import StaticFiles
 from starlette.types import ASGIApp
 from starlette.websockets import WebSocket, WebSocketDisconnect
 
+from velatura import kernel
 from velatura.editor import bundle, guard
 from velatura.editor.folder import LARGEST, Conflict, Folder
 from velatura.editor.guard import Guard, refusal
@@ -192,6 +193,8 @@ def _answer(verb: Verb, body: Callable[[], Body]) -> tuple[int, str]:
         return 200, _text(verb(body()))
     except VelaturaError as error:
         return 409 if isinstance(error, Conflict) else 422, _error(str(error))
+    finally:
+        kernel.return_memory()
 
 
 def _text(answer: Answer) -> str:
