@@ -38,11 +38,13 @@ COATS = [
     Interface(eta=1.8, alpha=0.2),
     Interface(eta=0.2, k=3.9, alpha=0.1),
 ]
+MIST = [Medium(sigma_s=0.7, g=0.3), Interface(eta=1.5, alpha=0.2), Interface(eta=0.2, k=3.9, alpha=0.3)]
 BRUSHED = [Interface(eta=1.5, alpha=0.1), Interface(eta=0.2, k=3.9, alpha=(0.4, 0.1), rotation=30)]
 CASES = {
     "metal": (METAL, "fgd-multi", 0.7),
     "brushed": (BRUSHED, "fgd", 0.5),
     "coats": (COATS, "fgd", 0.4),
+    "mist": (MIST, "fgd", 0.6),
     "paint": (PAINT, "fgd", 0.7),
     "pane": (PANE, "fgd", 0.7),
     "pane from below": (PANE, "fgd", -0.5),

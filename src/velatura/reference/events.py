@@ -27,7 +27,7 @@ class SurfaceMeeting:
     """A path that meets surface `j` from `wi`, out of a slab of index `n_in`; beyond lies index `n_out`.
 
     That is in the stack where the light comes from `above`, or else below the surface. `light` is its polarisation,
-    along -wi; None where that is left out.
+    along -wi; None where that is left out. `sample` has no choice where the path `reflects`, or `refracts`.
     """
 
     layers: WalkedLayers
@@ -37,6 +37,8 @@ class SurfaceMeeting:
     wi: Direction
     above: Value
     light: Polarisation | None = None
+    reflects: Value = False
+    refracts: Value = False
 
     @property
     def eta(self) -> Value:
@@ -144,7 +146,7 @@ def _sample_interface(meeting: SurfaceMeeting, carried: Value, u1: Value, u2: Va
     sides = meeting.n_in, meeting.n_out, meeting.above
     (reflectance, passing), mirrored, refracted = meeting.layers.meet(meeting.j, i, h, *sides, light)
     chance = ops.divide(mean(carried * reflectance), mean(carried * (reflectance + passing)))
-    chance = ops.select(meeting.opaque, 1.0, chance)
+    chance = ops.select(meeting.refracts, 0.0, ops.select(meeting.opaque | meeting.reflects, 1.0, chance))
     reflected = u3 < chance
     o = ops.select_record(reflected, ggx.reflect(i, h), refraction.refract(i, h, eta))
     # Weigh

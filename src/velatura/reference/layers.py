@@ -147,6 +147,17 @@ class WalkedLayers:
     def slab(self, k: Value) -> WalkedSlab:
         return pick(self.slabs, k)
 
+    @property
+    def hazy(self) -> bool:
+        """Whether a medium lies outside of all surfaces, which light may come back from."""
+        return bool(self.slabs[0].phase or self.slabs[-1].phase)
+
+    def outside(self, k: Value) -> Value:
+        """Whether light in slab k has left for good."""
+        if self.hazy:
+            return False
+        return (k == 0) | (k == self.count) if self.transmits else k == 0
+
     def is_base(self, j: Value) -> Value:
         return True if self.count == 1 else j == self.count - 1
 

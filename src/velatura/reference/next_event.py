@@ -58,7 +58,7 @@ class WayOut:
     `density` is that of the drawn w. `others`, times the density with which a path would take w, over `density`, is
     the sum of the densities of all strategies that draw more by the path, relative to this one's. `reverse` is the
     density with which a path from outside would draw w, over `density`. `back` are the ways by a reflection, of slab 1
-    and those below it, for paths where `turns`.
+    and those below it, for paths where `turns`; none where a medium lies outside.
     """
 
     w: tuple[Direction, ...]
@@ -125,7 +125,7 @@ def way_out(types: Any, layers: WalkedLayers, wo: Direction, rng: Any, turns: Va
         reverse.append(reverse[k] * ops.divide(inward.reverse, inward.density))
     up, down = ([x * s for x, s in zip(weights, spread)] for weights in _sum_reflections(crossings))
     out = WayOut(*map(tuple, (w, up, down, density, others, reverse)))
-    if turns is False or layers.count == 1:
+    if turns is False or layers.count == 1 or layers.hazy:
         return out, rng
     back, rng = _way_back(types, layers, out, smooth, rng)
     return replace(out, back=back, turns=turns), rng

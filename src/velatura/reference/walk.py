@@ -143,7 +143,10 @@ def _scatter(types: Any, layers: WalkedLayers, path: Path, out: WayOut | None, p
     beyond = ops.select(down, path.slab + 1, path.slab - 1)
     wi = (-path.w[0], -path.w[1], ops.absolute(path.w[2]))
     light = path.light and path.light.mirrored(down ^ True)
-    meeting = SurfaceMeeting(layers, j, pick(layers.index, path.slab), pick(layers.index, beyond), wi, down, light)
+    # What leaves is gathered, and need not be drawn
+    enters, leaves = (False, False) if out is None else (layers.outside(path.slab), layers.outside(beyond))
+    index = pick(layers.index, path.slab), pick(layers.index, beyond)
+    meeting = SurfaceMeeting(layers, j, *index, wi, down, light, reflects=leaves, refracts=enters)
     u1, u2, u3 = (path.rng.next_float32() for _ in range(3))
     targets = [] if out is None else [(way_up(out, j, down), down)]
     if out is not None and out.back:
