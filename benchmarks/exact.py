@@ -1,5 +1,8 @@
 """The form `exact` beside the walk and the model: equal light, noise, and cost, over stacks of the benchmark.
 
+Values: variance of single estimates at the model's directions, over the model's density and the light squared, and
+processor time of an evaluation; with the estimator of pbrt-v4 (`layered_bxdf.py`) where that is one of the stack.
+
 Agreement: light of samples in 24 cells of directions, against that of walks, by z-tests at .01 for all cells of all
 stacks together (Sidak); and all light, with 1 % more, as far as samples distinguish that from chance. Pictures:
 spheres in the studio by path tracing, rounds interleaved; noise is the standard deviation of a pixel over rounds (root
@@ -7,7 +10,7 @@ mean square, and median over pixels), cost is processor time, and error at equal
 of the model noise alone, as the least that estimates of walks can reach.
 
     python benchmarks/exact.py [--of-each 1] [--kinds "two interfaces" ...] [--count 262144] [--spp 16] [--rounds 6]
-        [--size 96] [--parts agreement pictures]
+        [--size 96] [--parts agreement values pictures] [--variant llvm_ad_rgb]
 """
 
 from __future__ import annotations
@@ -17,6 +20,7 @@ from collections.abc import Iterable
 from typing import Any
 
 import numpy as np
+from layered_bxdf import fits
 from numpy.typing import NDArray
 from rows import parsed, row
 from scipy import stats
@@ -40,7 +44,8 @@ def bsdfs(stack: Stack, often: bool) -> dict[str, Any]:
     material = dumps(stack, "json")
     model = {"type": "layered", "material": material, "reflectance": "fgd-multi" if often else "fgd"}
     walk = {"type": "layered_reference", "material": material, "microsurface": often}
-    return {"model": model, "exact": {**model, "form": "exact"}, "walk": walk}
+    found = {"model": model, "exact": {**model, "form": "exact"}, "walk": walk}
+    return {**found, "pbrt": {"type": "layered_bxdf", "material": material}} if fits(stack, often) else found
 
 
 def interactions(mi: Any, wi: Iterable[float], count: int) -> Any:
@@ -49,6 +54,8 @@ def interactions(mi: Any, wi: Iterable[float], count: int) -> Any:
 
     si = dr.zeros(mi.SurfaceInteraction3f, count)
     si.wi, si.uv = mi.Vector3f(*map(float, wi)), mi.Point2f(dr.arange(mi.Float, count) / count, 0.5)
+    if mi.is_spectral:
+        si.wavelengths = type(si.wavelengths)(450, 520, 580, 640)
     dr.make_opaque(si.wi)  # one kernel for all directions
     return si
 
@@ -111,6 +118,40 @@ def agreement(mi: Any, cases: Iterable[Case], count: int) -> None:
     )
 
 
+def values(mi: Any, cases: Iterable[Case], count: int) -> None:
+    import drjit as dr
+
+    found: dict[str, list[float]] = {}
+    for case in cases:
+        plugins = {name: mi.load_dict(plugin) for name, plugin in bsdfs(case.stack, case.often).items()}
+        context = mi.BSDFContext(mi.TransportMode.Importance)
+        for number, wi in enumerate(case.incident):
+            si = interactions(mi, wi, count)
+            wo = mi.Vector3f(*drawn(mi, plugins["model"], wi, count, number)[0])
+            density = np.array(plugins["model"].pdf(context, si, wo), float)
+            rng, measured = mi.PCG32(count, number), {}
+            for name, bsdf in plugins.items():
+                weights, start = [], 0.0
+                for _ in range(2):
+                    si.uv = mi.Point2f(rng.next_float32(), rng.next_float32())
+                    dr.eval(si.uv)
+                    start = time.process_time()
+                    value = np.array(bsdf.eval(context, si, wo), float)[0]
+                    seconds = time.process_time() - start
+                    weights.append(np.where(density > 0, value / np.maximum(density, 1e-20), 0.0))
+                variance = np.mean((weights[0] - weights[1]) ** 2) / 2 / np.mean(weights) ** 2
+                measured[name] = float(variance), seconds / count * 1e6
+            print(case.id, number, *(f"{k} {v:.3g} in {t:.2f} us" for k, (v, t) in measured.items()), flush=True)
+            for name, (variance, microseconds) in measured.items():
+                found.setdefault(f"variance, {name}", []).append(variance)
+                found.setdefault(f"time, {name}", []).append(microseconds)
+                if name in ("walk", "pbrt"):
+                    ratio = np.prod(measured["exact"]) / max(np.prod(measured[name]), 1e-9)
+                    found.setdefault(f"variance times time, exact over {name}", []).append(float(ratio))
+    for name, each in found.items():
+        row("values", name, each, "us" if name.startswith("time") else "")
+
+
 def pictures(mi: Any, cases: Iterable[Case], spp: int, rounds: int, size: int) -> None:
     ratios: dict[tuple[str, str], list[float]] = {}
     for case in cases:
@@ -134,10 +175,10 @@ def pictures(mi: Any, cases: Iterable[Case], spp: int, rounds: int, size: int) -
         measured = {
             (title, name): values[name] / values["model"]
             for title, values in (("noise", noise), ("noise of the median pixel", usual), ("time", cost))
-            for name in ("exact", "walk")
+            for name in sorted(noise.keys() - {"model"})
         }
-        measured |= {("error at equal time", name): over_walk[name] for name in ("exact", "model")}
-        print(f"{case.id:24s} {' '.join(f'{x:.2f}' for x in measured.values())}", flush=True)
+        measured |= {("error at equal time", name): over_walk[name] for name in sorted(noise.keys() - {"walk"})}
+        print(case.id, *(f"{title}, {name} {x:.2f};" for (title, name), x in measured.items()), flush=True)
         for named, x in measured.items():
             ratios.setdefault(named, []).append(x)
     for (title, name), each in ratios.items():
@@ -153,9 +194,10 @@ def main() -> None:
         spp=16,
         rounds=6,
         size=96,
-        parts=(["agreement", "pictures"], "what is measured", ["agreement", "pictures"]),
+        parts=(["agreement", "values", "pictures"], "what is measured", ["agreement", "values", "pictures"]),
+        variant="llvm_ad_rgb",
     )
-    mi = kernel.mitsuba("llvm_ad_rgb")
+    mi = kernel.mitsuba(arguments.variant)
     vt.register()
     kinds: dict[str, list[Case]] = {}
     for case in chosen([kind for kind in arguments.kinds if kind] or None):
@@ -164,6 +206,8 @@ def main() -> None:
     cases = [each[(2 * k + n) % len(each)] for k, each in enumerate(kinds.values()) for n in range(arguments.of_each)]
     if "agreement" in arguments.parts:
         agreement(mi, cases, arguments.count)
+    if "values" in arguments.parts:
+        values(mi, cases, arguments.count)
     if "pictures" in arguments.parts:
         pictures(mi, cases, arguments.spp, arguments.rounds, arguments.size)
 
