@@ -8,6 +8,7 @@ import re
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any
 
 import chromium
@@ -27,10 +28,7 @@ from velatura.stack import Material, MaterialLike
 Array = NDArray[np.floating]
 
 RADIUS = 0.98
-THREE = bundle.SOURCES / "node_modules" / "three"
-ADDRESS = "http://three.test/"
-NETWORK = "https://unpkg.com/three@[0-9.]+/"
-PAGE = """<!doctype html><script type="importmap">{"imports": {"three": "/build/three.module.js"}}</script>"""
+ADDRESS = "http://engine.test/"
 
 DRAW = """
 async (job) => {
@@ -75,11 +73,23 @@ async (job) => {
 
 
 @dataclass(frozen=True)
+class Engine:
+    """An engine: the folder of its package, the address in place of which it is served, a page with it, and a function
+    that draws a ball there."""
+
+    folder: Path
+    network: str
+    page: str
+    draw: str
+
+
+@dataclass(frozen=True)
 class Stage:
-    """A page with three.js, in which balls are drawn."""
+    """A page with an engine, in which balls are drawn."""
 
     page: Any
-    files: dict[str, str]
+    engine: Engine
+    files: dict[str, str | bytes]
 
     def ball(
         self,
@@ -92,15 +102,15 @@ class Stage:
         """A ball, linear colours and coverage (size, size, 4), from the top.
 
         Args:
-            module: text of an export to three.
-            sky: environment (height, width, 3), from the top, y up, in three's coordinates.
+            module: text of an export.
+            sky: environment (height, width, 3), from the top, y up, in the engine's coordinates.
             light: direction of a light in place of the environment.
         """
         name = f"{len(self.files)}.js"
-        self.files[name] = module
+        self.files.update({name: module, "sky.hdr": radiance(sky)})
         rgba = np.pad(sky[::-1], ((0, 0), (0, 0), (0, 1)), constant_values=1).astype("<f4")
         found = self.page.evaluate(
-            DRAW,
+            self.engine.draw,
             {
                 "module": f"/{name}",
                 "sky": base64.b64encode(rgba.tobytes()).decode(),
@@ -116,12 +126,17 @@ class Stage:
         pixels = np.frombuffer(base64.b64decode(found["pixels"]), np.float32).reshape(size, size, 4)
         return pixels[::-1]
 
-    def visit(self, name: str, size: int = 64) -> tuple[Array, list[str]]:
-        """A page of the files when it has drawn, sRGB from 0 to 255 (size, size, 3), and what its console says."""
+    def visit(
+        self, name: str, size: int = 64, ready: str = "document.querySelector('canvas')"
+    ) -> tuple[Array, list[str]]:
+        """A page of the files two frames after it is ready, sRGB from 0 to 255 (size, size, 3), and errors and warnings
+        of its console."""
         page, said = self.page.context.browser.new_page(), list[str]()
 
         def listen(message: Any) -> None:
-            if "GPU stall" not in message.text:  # which drivers say of the screenshot
+            if (
+                message.type in ("error", "warning") and "GPU stall" not in message.text
+            ):  # which drivers say of the screenshot
                 said.append(message.text)
 
         page.on("console", listen)
@@ -129,18 +144,18 @@ class Stage:
         page.set_viewport_size({"width": size, "height": size})
         self.serve(page)
         page.goto(ADDRESS + name)
-        page.wait_for_function("document.querySelector('canvas')")
+        page.wait_for_function(ready)
         page.evaluate("() => new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(done)))")
         picture = np.asarray(Image.open(io.BytesIO(page.screenshot())).convert("RGB"))
         page.close()
         return picture, said
 
     def serve(self, page: Any) -> None:
-        """Give a page the files, and three.js in place of the network."""
+        """Give a page the files, and the engine in place of the network."""
 
         def answer(route: Any) -> None:
-            name = re.sub(rf"^{ADDRESS}|^{NETWORK}", "", route.request.url)
-            path = THREE / name
+            name = re.sub(rf"^{ADDRESS}|^{self.engine.network}", "", route.request.url)
+            path = self.engine.folder / name
             kind = "text/html" if name.endswith("html") else "text/javascript"
             if name in self.files:
                 route.fulfill(body=self.files[name], content_type=kind)
@@ -152,14 +167,45 @@ class Stage:
         page.route("**", answer)
 
 
+THREE = Engine(
+    bundle.SOURCES / "node_modules" / "three",
+    "https://unpkg.com/three@[0-9.]+/",
+    """<!doctype html><script type="importmap">{"imports": {"three": "/build/three.module.js"}}</script>""",
+    DRAW,
+)
+
+
 @contextmanager
-def stage() -> Iterator[Stage]:
+def stage(engine: Engine = THREE) -> Iterator[Stage]:
     """A page for as long as the block runs."""
     with chromium.browser() as browser:
-        opened = Stage(browser.page, {"index.html": PAGE})
+        opened = Stage(browser.page, engine, {"index.html": engine.page})
         opened.serve(browser.page)
         browser.page.goto(f"{ADDRESS}index.html")
         yield opened
+
+
+def softbox(width: int = 64) -> Array:
+    """A bright, coloured window over a gradient, (width / 2, width, 3)."""
+    row, column = np.mgrid[: width // 2, :width] / width
+    window = np.exp(-(((column - 0.7) / 0.06) ** 2) - ((row - 0.13) / 0.06) ** 2)
+    return np.asarray((0.1 + 0.4 * (0.5 - row))[..., None] + 6 * window[..., None] * [1, 0.8, 0.5], np.float32)
+
+
+def frame_at(row: int, column: int, size: int) -> Array:
+    """Tangent, bitangent and normal of the ball at a pixel, in rows; x to the right, y up, z towards the viewer."""
+    x, y = ((np.array([column, row]) + 0.5) / size * 2 - 1) * [1, -1] / RADIUS
+    n = np.array([x, y, np.sqrt(1 - x * x - y * y)])
+    t = np.cross([0, 1, 0], n)
+    return np.stack([t / np.linalg.norm(t), np.cross(n, t) / np.linalg.norm(t), n])
+
+
+def radiance(sky: Array) -> bytes:
+    """An environment as a file of Radiance, with one exponent a texel (Ward 1991)."""
+    exponent = np.frexp(np.maximum(sky.max(axis=-1), 1e-30))[1]
+    bytes_ = np.concatenate([sky * 256 / np.ldexp(1.0, exponent)[..., None], exponent[..., None] + 128.0], axis=-1)
+    head = f"#?RADIANCE\nFORMAT=32-bit_rle_rgbe\n\n-Y {sky.shape[0]} +X {sky.shape[1]}\n"
+    return head.encode() + bytes_.astype(np.uint8).tobytes()
 
 
 def sampled(material: MaterialLike, sky: Array, size: int, samples: int, tilt: float = 0.0) -> Array:

@@ -23,7 +23,7 @@ import pytest
 from machines import MACHINES
 
 import velatura as vt
-from velatura.exports import FORMATS, baked, klems, three
+from velatura.exports import FORMATS, baked, klems, real_time
 from velatura.exports.request import Request
 from velatura.model import named
 from velatura.stack import Texture
@@ -41,7 +41,7 @@ CONTROL = ["\n", "\r", "a\0", "\x1b[2J", "\x7f", "\x85", "\u2028", "\u2029", "\u
 MODEL = "belcour2018"
 
 TEXTS = [name for name, each in FORMATS.items() if each.is_text]
-PAINTED = [name for name in TEXTS if name not in ("bsdf-xml", "three")]  # which have no textures
+PAINTED = [name for name in TEXTS if name not in ("bsdf-xml", "three", "babylon")]  # which have no textures
 
 Structure = Callable[[str], Any]
 
@@ -126,9 +126,9 @@ def fitted_once(monkeypatch: pytest.MonkeyPatch) -> None:
         return replace(made, name=stack.name, images=images)
 
     monkeypatch.setattr(baked, "bake", of_any_name)
-    of_parts, harmless = three.environment, Request("three", painted(), named(MODEL), {}, None, {})
+    of_parts, harmless = real_time.environment, Request("three", painted(), named(MODEL), {}, None, {})
     parts = functools.cache(lambda: of_parts(harmless))
-    monkeypatch.setattr(three, "environment", lambda request: parts())
+    monkeypatch.setattr(real_time, "environment", lambda request: parts())
     nothing = np.zeros((klems.PATCHES, klems.PATCHES))
     monkeypatch.setattr(klems, "sides", lambda bsdf, side: (nothing, nothing))
 

@@ -61,7 +61,7 @@ OTHERS = {
     "text": "it is output",
     "glsl": "tests/system/test_engines.py runs it",
     "js": "tests/browser/test_shader.py runs it",
-    "html": "tests/browser/test_three.py opens it",
+    "html": "tests/browser/test_three.py and test_babylon.py open it",
 }
 # Scripts of the gallery that are not run here, and the tests that run them
 RUN_ELSEWHERE = {

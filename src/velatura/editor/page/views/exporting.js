@@ -17,6 +17,7 @@ const GROUPS = {
     'gltf-coat': 'glTF 2.0, with a coat',
     usd: 'USD, OpenPBR and preview',
     three: 'three.js, material',
+    babylon: 'Babylon.js, material',
     mtlx: 'MaterialX, by closures',
     'mitsuba-principled': 'Mitsuba 3, principled',
     'mitsuba-xml': 'Mitsuba 3, this plugin',
