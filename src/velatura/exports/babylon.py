@@ -24,8 +24,8 @@ def write(request: Request) -> Export:
         InvalidInput: a material with textures.
     """
     printer = Glsl(half=True)
-    made = real_time.lit(request, printer)
-    code = [real_time.without_comments(text) for text in (made.code, made.frame, made.environment)]
+    made, around = real_time.lit(request, printer), real_time.environment(request)
+    code = [real_time.without_comments(text) for text in (made.code, made.frame, around.text)]
     text = _MODULE.format(
         name=remark(title(request.material)),
         model=described(request.model),
@@ -38,7 +38,7 @@ def write(request: Request) -> Export:
         frame=real_time.template(code[1]),
         environment=real_time.template(code[2]),
         unpacked=real_time.UNPACKED,
-        textures=real_time.stored(made.textures),
+        textures=real_time.stored({"vt_parts": around.texture, **made.textures}),
     )
     return Export(
         text, facts={**facts_of(made.shader, printer.language, request.folder), "exports": ["layeredMaterial", "code"]}

@@ -57,6 +57,7 @@ FORMATS: dict[str, Format] = {
     "blender": Format((".py",), "velatura.exports.blender"),
     "three": Format((".js", ".mjs"), "velatura.exports.three"),
     "babylon": Format((".js", ".mjs"), "velatura.exports.babylon"),
+    "godot": Format((".tres",), "velatura.exports.godot"),
     "mtlx": Format((".mtlx",), "velatura.exports.mtlx"),
     "json": Format((".json",), "velatura.exports.json", has_facts=False),
     "mitsuba-xml": Format((".xml",), "velatura.exports.mitsuba_xml"),
@@ -94,11 +95,11 @@ def export(
         material: a stack, a mixture, a file, or a preset's name.
         to: one of `FORMATS`: a shader in "glsl" (ES 3.00), "glsl450", "vulkan" (GLSL), "hlsl", "slang" or "wgsl"; a
             shader of closures, "osl", or "blender", a script that makes a material of it; "mtlx", a graph of MaterialX;
-            "three" and "babylon", modules with a material for three.js and Babylon.js; "json", the material with its
-            numbers; "mitsuba-xml", a scene to be included; "python", a script that renders it; "bsdf", a measurement
-            that Mitsuba's plugin `measured` loads; "bsdf-xml", matrices for WINDOW and Radiance; fitted parameters in
-            "openpbr", "gltf", "gltf-coat", "usd" (OpenPBR and UsdPreviewSurface), "blender-principled" or
-            "mitsuba-principled".
+            "three" and "babylon", modules with a material for three.js and Babylon.js; "godot", a material of Godot 4;
+            "json", the material with its numbers; "mitsuba-xml", a scene to be included; "python", a script that
+            renders it; "bsdf", a measurement that Mitsuba's plugin `measured` loads; "bsdf-xml", matrices for WINDOW
+            and Radiance; fitted parameters in "openpbr", "gltf", "gltf-coat", "usd" (OpenPBR and UsdPreviewSurface),
+            "blender-principled" or "mitsuba-principled".
         model: a named model or its name (None for the default), its choices changed by `switches`.
         constant: for shaders, flat names of values that never change (`layer0_eta`), or ["all"].
         prefix: for shaders, begins all names in the code, so that one program may hold several materials; "vt" by

@@ -30,7 +30,8 @@ DENSITY = 3.4  # taps in a width of the blur
 
 @dataclass(frozen=True)
 class Environment:
-    """The parts of all stacks of a material: code in GLSL ES, and its texture (height, width, 4)."""
+    """The parts of all stacks of a material: code in GLSL ES, which calls vt_blurred(direction, root of alpha), and its
+    texture vt_parts, (height, width, 4)."""
 
     text: str
     texture: np.ndarray
@@ -38,13 +39,12 @@ class Environment:
 
 @dataclass(frozen=True)
 class Lit:
-    """A material in an engine: its shader; code in GLSL ES of the model, of the frame, and of environments, by
-    vt_blurred(direction, root of alpha); textures by name, (height, width, 4); whether both of its sides are seen."""
+    """A material in an engine: its shader; code in GLSL of the model and of the frame; textures by name, of shape
+    (height, width, 4); whether both of its sides are seen."""
 
     shader: Shader
     code: str
     frame: str
-    environment: str
     textures: Mapping[str, np.ndarray]
     two_sided: bool
 
@@ -59,24 +59,19 @@ def lit(request: Request, printer: Glsl) -> Lit:
     if varying:
         raise InvalidInput(f"{varying[0]}: {request.to} is written of uniform materials, without textures")
     made = shader(request.material, request.model, printer=printer, baking=True)
-    around = environment(request)
-    textures = {"vt_parts": around.texture}
-    if made.columns is not None:
-        textures["vt_baked"] = made.columns
     stacks = [stack for _, stack in request.material.leaves()]
     brushed = any(recording.variance(stack) is not Isotropic for stack in stacks)
     return Lit(
         made,
         made.text.replace(printer.first_lines, "", 1),
         _FRAME.format(tangent=_TANGENT if brushed else ""),
-        around.text,
-        textures,
+        {} if made.columns is None else {"vt_baked": made.columns},
         any(stack.transmits for stack in stacks),
     )
 
 
 def environment(request: Request) -> Environment:
-    """Light of a material without textures by an engine's environment."""
+    """The light of a material without textures by an engine's environment."""
     stacks = zip(shares(request.material), request.material.leaves())
     parts = [
         (share, prefiltered.prefiltered(Material.of(stack), request.model)) for share, (_, stack) in stacks if share

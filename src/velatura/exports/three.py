@@ -22,7 +22,7 @@ def write(request: Request) -> Export:
         InvalidInput: a material with textures.
     """
     printer = Glsl(half=True)
-    made = real_time.lit(request, printer)
+    made, around = real_time.lit(request, printer), real_time.environment(request)
     text = _MODULE.format(
         name=remark(title(request.material)),
         model=described(request.model),
@@ -31,9 +31,9 @@ def write(request: Request) -> Export:
         sided="DoubleSide" if made.two_sided else "FrontSide",
         code=real_time.template(made.code),
         frame=real_time.template(made.frame),
-        environment=real_time.template(made.environment),
+        environment=real_time.template(around.text),
         unpacked=real_time.UNPACKED,
-        textures=real_time.stored(made.textures),
+        textures=real_time.stored({"vt_parts": around.texture, **made.textures}),
     )
     return Export(
         text, facts={**facts_of(made.shader, printer.language, request.folder), "exports": ["LayeredMaterial", "code"]}

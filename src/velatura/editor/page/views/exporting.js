@@ -18,6 +18,7 @@ const GROUPS = {
     usd: 'USD, OpenPBR and preview',
     three: 'three.js, material',
     babylon: 'Babylon.js, material',
+    godot: 'Godot 4, material',
     mtlx: 'MaterialX, by closures',
     'mitsuba-principled': 'Mitsuba 3, principled',
     'mitsuba-xml': 'Mitsuba 3, this plugin',
