@@ -83,7 +83,8 @@ def environment(request: Request) -> Environment:
         lines += list(_part_lines(share, found, first))
         texels.append(np.pad(own, ((0, 0), (0, widest - own.shape[1]), (0, 0))))
         first += len(own)
-    return Environment(_ENVIRONMENT.format(parts="\n".join(lines)), np.concatenate(texels))
+    code = _ENVIRONMENT.format(parts="\n".join(lines), round=ROUND, half=DENSITY / 2)
+    return Environment(code, np.concatenate(texels))
 
 
 def _part_lines(share: float, found: Prefiltered, first: int) -> Iterator[str]:
@@ -153,7 +154,7 @@ vec4 vt_part_line(int line, ivec2 nodes, vec2 place) {{
 }}
 
 // A part on the side of the surface where it leaves, by blurs side by side
-vec3 vt_part(int line, ivec2 nodes, vec3 wi, float side, int taps) {{
+vec3 vt_part(int line, ivec2 nodes, vec3 wi, float side, int most) {{
     vec2 twice = vec2(wi.x * wi.x - wi.y * wi.y + 1e-15, 2.0 * wi.x * wi.y);
     float along = twice.x / (abs(twice.x) + abs(twice.y));
     vec2 place = vec2(sqrt(abs(wi.z)), 0.25 * (twice.y < 0.0 ? 3.0 + along : 1.0 - along));
@@ -179,6 +180,9 @@ vec3 vt_part(int line, ivec2 nodes, vec3 wi, float side, int taps) {{
     w = vec3(plane.x * w.x - plane.y * w.y, plane.y * w.x + plane.x * w.y, w.z);
     axis = vec3(plane.x * axis.x - plane.y * axis.y, plane.y * axis.x + plane.x * axis.y, axis.z);
 
+    // As many blurs as the axis is longer here; a blur's width to 10 %, of which details below .02 matter to no map
+    float width = b.y * b.y * (0.42 - 1.22 * log(max(b.y, 1e-3))), longer = sqrt(more) / max(width, 0.02);
+    int taps = longer > {round} ? min(1 + 2 * int(ceil({half} * longer)), most) : 1;
     vec3 sum = vec3(0.0);
     float whole = 0.0;
     for (int k = 0; k < taps; k++) {{
