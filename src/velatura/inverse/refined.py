@@ -22,6 +22,7 @@ from velatura.inverse.lobes.target import BLUR, Fixed, Target, distance
 from velatura.inverse.local import surrogate
 from velatura.inverse.local.coordinates import Bound, plain
 from velatura.inverse.local.dragged import DraggedStack, seen
+from velatura.inverse.local.line import Line
 from velatura.inverse.nearest import lobes_of
 from velatura.inverse.nearest import nearest as nearest_from
 from velatura.inverse.reasons import UNMET, Direction
@@ -40,6 +41,8 @@ LEAST_READINGS, MOST_READINGS = 5, 8  # of stacks, for one way
 SAID = 1e-4  # changes of quantities that are mentioned, as logarithms
 TRIES, OWN, FEWER = 6, 4, 4  # stacks that are begun with; those that have the lobes of one target; where none has
 PARTS = (1.0, 0.5, 0.25)  # of a correction, where all of it has no stack
+FOLLOWED, EXACT = 12, 2e-7  # readings of a search that follows the closed form, and by which these may miss
+LIKELY = 3  # stacks that it begins with
 MAPPED = 4  # requests, each corrected by what the model misses of the last one's stack
 SAME = 0.03  # logarithm by which models differ about the energy of an index
 MISSED = 1e-4  # energy or variance that is mentioned
@@ -50,13 +53,18 @@ SMALL = 0.01  # variance that is added to that of a goal, for units in which it 
 def search(target: Target, model: Model) -> Solution | None:
     """The preferred stack of the model in closed form, moved to one whose lobes, read by the model, are the target.
 
-    Of brushed lobes the search goes on from the stack that came nearest, if none of them leads to one.
+    At first the closed form is followed from few stacks, which ends after few readings where it leads astray. Of
+    brushed lobes the search goes on from the stack that came nearest, if none of them leads to one.
     """
     own = _of(target, model.surrogate, EFFORTS)
     if own is not None:
+        likely = list[Solution]()
         first = next(own)
-        others = itertools.chain(_corrected(first, target, model), own, _approaching(target, model.surrogate))
-        tried = itertools.islice(itertools.chain([first], others), TRIES)
+        for found in itertools.islice(itertools.chain([first], _corrected(first, target, model), own), LIKELY):
+            if (followed := _followed(found, target, model)) is not None:
+                return followed
+            likely.append(found)
+        tried = itertools.islice(itertools.chain(likely, own, _approaching(target, model.surrogate)), TRIES)
     else:
         tried = itertools.islice(_approaching(target, model.surrogate), FEWER)
     nearest, least = None, np.inf
@@ -74,6 +82,18 @@ def _approaching(target: Target, model: Model) -> Iterator[Solution]:
     """Stacks with the lobes of targets from which one is approached."""
     for start in itertools.islice(starts(target), 1, None):
         yield from _of(start, model, EFFORT) or ()
+
+
+def _followed(found: Solution, target: Target, model: Model) -> Solution | None:
+    """A stack near one that is found, with the lobes of a target, as the corrected closed form leads to it."""
+    dragged = None if target.pinned else _dragged(found, target, model)
+    if dragged is None or dragged.space.coated or dragged.achromatic(target) is not target:
+        return None
+    here, goal = dragged.point.reading.value, dragged.space.goal(target)
+    there = Line(dragged.point, here, goal, *dragged.constant(target), enough=EXACT).last(FOLLOWED)
+    if there.bound is not None or not there.settled:
+        return None
+    return Solution(target, model, tuple(there.point.layers))
 
 
 def _corrected(found: Solution, target: Target, model: Model) -> Iterator[Solution]:
