@@ -58,13 +58,13 @@ def search(target: Target, model: Model) -> Solution | None:
     """
     own = _of(target, model.surrogate, EFFORTS)
     if own is not None:
-        likely = list[Solution]()
-        first = next(own)
-        for found in itertools.islice(itertools.chain([first], _corrected(first, target, model), own), LIKELY):
+        likely, first = list[Solution](), next(own)
+        others = itertools.chain([first], _corrected(first, target, model), own, _approaching(target, model.surrogate))
+        for found in itertools.islice(others, 0 if target.pinned or target.has_films else LIKELY):
             if (followed := _followed(found, target, model)) is not None:
                 return followed
             likely.append(found)
-        tried = itertools.islice(itertools.chain(likely, own, _approaching(target, model.surrogate)), TRIES)
+        tried = itertools.islice(itertools.chain(likely, others), TRIES)
     else:
         tried = itertools.islice(_approaching(target, model.surrogate), FEWER)
     nearest, least = None, np.inf
@@ -86,8 +86,8 @@ def _approaching(target: Target, model: Model) -> Iterator[Solution]:
 
 def _followed(found: Solution, target: Target, model: Model) -> Solution | None:
     """A stack near one that is found, with the lobes of a target, as the corrected closed form leads to it."""
-    dragged = None if target.pinned else _dragged(found, target, model)
-    if dragged is None or dragged.space.coated or dragged.achromatic(target) is not target:
+    dragged = _dragged(found, target, model)
+    if dragged is None or dragged.achromatic(target) is not target:
         return None
     here, goal = dragged.point.reading.value, dragged.space.goal(target)
     there = Line(dragged.point, here, goal, *dragged.constant(target), enough=EXACT).last(FOLLOWED)
