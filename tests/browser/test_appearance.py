@@ -697,6 +697,16 @@ def test_further_wishes_are_dragged(visit: Open) -> None:
     drag(look.get_by_label("Film, by its thickness: share, slider"), (round(0.3 * most), round(0.4 * most)))
     assert page.state("layers.0.keys.films.0.thickness_nm") != pytest.approx(thickness, abs=1)
 
+    # Grazing light, which lobes at normal incidence are kept for
+    look = further("Coloured absorbing coat")
+    before = lobes(page)
+    shown = look.get_by_label("Reflected at a second angle: share, slider")
+    tick = int(shown.input_value())
+    drag(shown, (tick - 3, tick - 2))
+    after = lobes(page)
+    assert np.allclose(before.energy, after.energy, atol=2e-3) and np.allclose(before.alpha, after.alpha, atol=2e-3)
+    assert int(shown.input_value()) < tick
+
     # A mixture, by its weights; its parts are wished for one at a time
     look = further("Half-metallic paint")
     page.settled()
