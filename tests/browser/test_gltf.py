@@ -52,7 +52,7 @@ async (text) => {
 
 @pytest.fixture(scope="module")
 def stage() -> Iterator[in_three.Stage]:
-    if not in_three.THREE.is_dir():
+    if not in_three.THREE.folder.is_dir():
         pytest.skip(f"three.js is missing: npm ci in {in_three.bundle.SOURCES}")
     with in_three.stage() as opened:
         yield opened
