@@ -338,17 +338,17 @@ def test_a_stack_is_mixed_with_another_and_is_itself_again(visit: Open, served: 
     enamel = page.picture()
     assert page.state("parts.0.weight") == 1 and difference(enamel, half) > OTHER
     page.page.get_by_role("button", name=f"Remove {vt.preset('coated-gold').name}").click()
-    assert difference(page.picture(), enamel) < SAME and page.page.locator(".part").count() == 0
+    assert difference(page.picture(), enamel) < SAME and page.page.locator("li.part").count() == 0
     for _ in range(2):
         page.page.get_by_role("button", name="Undo").click()
     assert difference(page.picture(), half) < SAME
 
     # The layers of the other part, and a share that is typed
-    page.page.locator(".part").get_by_title("Show its layers").click()
+    page.page.locator("li.part").get_by_title("Show its layers").click()
     assert page.page.locator(".layer").count() == len(vt.preset("coated-gold").layers)
     drag(slider(page, 2, "Roughness u"), range(60, 121, 20))
     assert difference(page.picture(), half) > OTHER / 2
-    field = page.page.locator(".part").first.get_by_label("Red enamel, share", exact=True)
+    field = page.page.locator("li.part").first.get_by_label("Red enamel, share", exact=True)
     field.fill("1.2")
     field.press("Enter")
     assert "Red enamel, share: must lie in 0 to 1, got 1.2" in said(page).inner_text()
@@ -377,7 +377,7 @@ def test_a_stack_is_mixed_with_another_and_is_itself_again(visit: Open, served: 
     assert "plots are of the chosen part" in page.page.locator(".inspector").inner_text()
     page.page.get_by_role("button", name="Remove Red enamel").click()
     page.settled()
-    assert page.page.locator(".part").count() == 0 and page.state("name") == vt.preset("coated-gold").name
+    assert page.page.locator("li.part").count() == 0 and page.state("name") == vt.preset("coated-gold").name
     for _ in range(5):
         page.page.get_by_role("button", name="Undo").click()
     assert difference(page.picture(), gold) < SAME

@@ -155,7 +155,8 @@ def test_a_black_material_is_black_in_all() -> None:
     """Expected: a fit, where no light sets a scale."""
     black = vt.Stack([vt.Interface(eta=1.0, alpha=0.2), vt.Diffuse(albedo=0.0)])
     for target in TARGETS:
-        assert bake(vt.Mix([(0.0, PAINT), (None, black)]), target).baked_albedo.max() < 0.01
+        most = 0.1 if target == "usd" else 0.01  # UsdPreviewSurface always reflects at the edge
+        assert bake(vt.Mix([(0.0, PAINT), (None, black)]), target).baked_albedo.max() < most
 
 
 @pytest.mark.parametrize("target", TARGETS)

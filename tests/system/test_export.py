@@ -24,7 +24,7 @@ from velatura.bakes import TARGETS
 from velatura.exports import FORMATS
 from velatura.exports.request import headed
 from velatura.exports.shader import LANGUAGES
-from velatura.shader import shader
+from velatura.shader import closures, prefiltered, shader
 from velatura.shader.lookups import atlas
 
 Run = Callable[..., tuple[int, str, str]]
@@ -44,8 +44,10 @@ def test_glsl_is_the_shader_with_its_tables_beside(run: Run, tmp_path: Path) -> 
     np.testing.assert_array_equal(found.reshape(made.tables.shape), made.tables)
 
 
-def test_python_exports_what_the_command_writes(run: Run, tmp_path: Path) -> None:
+def test_python_exports_what_the_command_writes(run: Run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Expected: `vt.export` of a preset's name has the text of the command line, and saves the same files."""
+    monkeypatch.setattr(prefiltered, "SAMPLES", 16)
+    monkeypatch.setattr(closures, "PLANE", (16, 9))
     for to in TEXTS:
         made = vt.export("coated-gold", to, "belcour2018", tir="off")
         _, out, _ = run("export", "coated-gold", "--to", to, "--model", "belcour2018", "--set", "tir=off")
@@ -54,7 +56,8 @@ def test_python_exports_what_the_command_writes(run: Run, tmp_path: Path) -> Non
         facts = [made.described(written[0]).encode()] if made.facts else []
         assert [path.read_bytes() for path in written] == [made.text.encode(), *made.beside.values(), *facts]
     files = {path.name for path in tmp_path.iterdir()}
-    described = {f"gold.{ending}" for ending in ("glsl", "hlsl", "js", "osl", "slang", "wgsl", "mtlx", "py", "xml")}
+    endings = "glsl", "hlsl", "js", "osl", "slang", "tres", "wgsl", "mtlx", "py", "xml"
+    described = {f"gold.{ending}" for ending in endings}
     assert files == described | {f"{name}.json" for name in described} | {"gold.json", "gold.tables.bin"}
     with pytest.raises(vt.InvalidInput, match="unknown format 'oslo'"):
         vt.export("coated-gold", "oslo")

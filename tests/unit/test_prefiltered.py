@@ -38,7 +38,7 @@ def test_a_smooth_metal_is_a_mirror_and_a_brushed_one_is_longer_across() -> None
     np.testing.assert_allclose(mirror[:, 3], -1, atol=0.01)
     assert np.max(mirror[:, 5] ** 2) < 0.02
     brushed = parts(vt.Interface(conductor="mirror", alpha=[0.3, 0.05]))
-    at_normal = brushed.rows[0].reshape(32, 17, -1, 8)[-1, 0, 0]
+    at_normal = brushed.rows[0].reshape(32, 17, -1, 12)[-1, 0, 0]
     assert at_normal[6] > 0.05 and abs(at_normal[7]) < 0.02
     assert brushed.elongation[0] > 2
 

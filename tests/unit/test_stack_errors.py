@@ -244,11 +244,14 @@ def test_a_missing_texture_is_named(tmp_path: Path) -> None:
         ("folder", "folder: is a folder, not a material file"),
         ("folder.yaml", "folder.yaml: is a folder, not a material file"),
         ("latin.yaml", "latin.yaml: is not UTF-8 text (byte 6)"),
-        ("notes.txt", "notes.txt: a material file ends in .yaml, .yml, .json, .mtlx, .gltf, .glb, .xml"),
+        (
+            "notes.txt",
+            "notes.txt: a material file ends in .yaml, .yml, .json, .mtlx, .gltf, .glb, .xml, .usda, .usd, .usdc",
+        ),
         (
             "coated-gild",
             "unknown preset 'coated-gild' (did you mean coated-gold?); a material file ends in .yaml, .yml, .json, "
-            ".mtlx, .gltf, .glb, .xml",
+            ".mtlx, .gltf, .glb, .xml, .usda, .usd, .usdc",
         ),
         ("x\0.yaml", "x\\x00.yaml: cannot be read: embedded null byte"),
         ("x" * 300 + ".yaml", "x" * 300 + ".yaml: cannot be read: file name too long"),

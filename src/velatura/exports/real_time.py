@@ -50,7 +50,7 @@ class Lit:
 
 
 def lit(request: Request, printer: Glsl) -> Lit:
-    """What a module for an engine holds of a material.
+    """The parts of a material that a module for an engine holds.
 
     Raises:
         InvalidInput: a material with textures.
