@@ -333,7 +333,7 @@ def test_a_stack_is_mixed_with_another_and_is_itself_again(visit: Open, served: 
     key = page.page.evaluate("velatura.shader().key")
     half = page.picture()
     assert difference(half, gold) > OTHER
-    share = page.page.locator(".part").first.get_by_label("share, slider")
+    share = page.page.locator("li.part").first.get_by_label("share, slider")
     drag(share, range(100, 201, 20))
     enamel = page.picture()
     assert page.state("parts.0.weight") == 1 and difference(enamel, half) > OTHER
