@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 import velatura as vt
-from velatura.errors import MissingTool
+from velatura.errors import Incomplete, MissingTool
 from velatura.exports import baked
 from velatura.programs import embedded
 from velatura.programs.usd.write import PROGRAM
@@ -86,7 +86,8 @@ def test_a_stack_comes_back(painted: vt.Stack, tmp_path: Path) -> None:
     changed."""
     for stack in (painted, GOLD, BRUSHED):
         path = saved(stack, tmp_path)
-        assert vt.load(path) == stack
+        with pytest.warns(Incomplete, match="which is read"):
+            assert vt.load(path) == stack
         layer = Sdf.Layer.OpenAsAnonymous(str(path))
         layer.Export(str(tmp_path / "b.usdc"))
         assert vt.imports.read(tmp_path / "b.usdc").stack == stack
