@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Generator, Iterator
 from typing import Any
 
+import in_three
 import pytest
 from editor import Server, Tabs, Visit, browser, server, unexpected
 
@@ -33,6 +34,15 @@ def visit(tabs: Tabs, served: Server) -> Iterator[Callable[..., Visit]]:
     assert unexpected(tabs.forget(), []) == []
     for file in served.folder.iterdir():
         file.unlink()
+
+
+@pytest.fixture(scope="module")
+def three() -> Iterator[in_three.Stage]:
+    """A page with three.js."""
+    if not in_three.THREE.folder.is_dir():
+        pytest.skip(f"three.js is missing: npm ci in {in_three.bundle.SOURCES}")
+    with in_three.stage() as found:
+        yield found
 
 
 @pytest.hookimpl(wrapper=True)

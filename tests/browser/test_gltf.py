@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import base64
 import io
-from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -50,23 +49,15 @@ async (text) => {
 """.replace("SIZE", str(SIZE))
 
 
-@pytest.fixture(scope="module")
-def stage() -> Iterator[in_three.Stage]:
-    if not in_three.THREE.folder.is_dir():
-        pytest.skip(f"three.js is missing: npm ci in {in_three.bundle.SOURCES}")
-    with in_three.stage() as opened:
-        yield opened
-
-
-def drawn(stage: in_three.Stage, path: Path) -> tuple[dict[str, Any], np.ndarray]:
+def drawn(three: in_three.Stage, path: Path) -> tuple[dict[str, Any], np.ndarray]:
     """What three.js has of a file's material, and its picture, sRGB from 0 to 255 (height, width, 4)."""
-    found = stage.page.evaluate(DRAW, base64.b64encode(path.read_bytes()).decode())
+    found = three.page.evaluate(DRAW, base64.b64encode(path.read_bytes()).decode())
     picture = Image.open(io.BytesIO(base64.b64decode(found.pop("picture")))).convert("RGBA")
     return found, np.asarray(picture, float)
 
 
 @pytest.mark.parametrize("ending", [".gltf", ".glb"])
-def test_paint_with_an_image_is_drawn(stage: in_three.Stage, tmp_path: Path, ending: str) -> None:
+def test_paint_with_an_image_is_drawn(three: in_three.Stage, tmp_path: Path, ending: str) -> None:
     """Expected: one ball, whose upper half has the colours of the upper half of the image: red above, blue below."""
     if ending == ".glb":
         halves = np.full((8, 8, 3), 0.1, np.float32)
@@ -77,7 +68,7 @@ def test_paint_with_an_image_is_drawn(stage: in_three.Stage, tmp_path: Path, end
         colour = (0.6, 0.1, 0.1)
     paint = vt.Stack([vt.Interface(eta=1.5, alpha=0.3), vt.Diffuse(albedo=colour)], name="Halves")
     path = vt.export(paint, "gltf", folder=tmp_path, mesh="sphere").save(tmp_path / f"ball{ending}")[0]
-    found, picture = drawn(stage, path)
+    found, picture = drawn(three, path)
     assert found["meshes"] == 1 and found["tangents"] and found["material"]["name"] == "Halves"
     above, below = picture[SIZE // 4, SIZE // 2], picture[3 * SIZE // 4, SIZE // 2]
     assert above[0] > 1.5 * above[2]
@@ -85,10 +76,10 @@ def test_paint_with_an_image_is_drawn(stage: in_three.Stage, tmp_path: Path, end
     assert picture[0, 0, 3] == 0
 
 
-def test_a_coat_is_a_clearcoat_to_those_that_know_no_other(stage: in_three.Stage, tmp_path: Path) -> None:
+def test_a_coat_is_a_clearcoat_to_those_that_know_no_other(three: in_three.Stage, tmp_path: Path) -> None:
     """Expected: metal of the file's roughness below a clearcoat, though three.js does not read the coat."""
     gold = vt.Stack([vt.Interface(eta=1.5, alpha=0.04), vt.Interface(conductor="Au", alpha=0.25)])
-    found, picture = drawn(stage, vt.export(gold, "gltf-coat", mesh="sphere").save(tmp_path / "gold.glb")[0])
+    found, picture = drawn(three, vt.export(gold, "gltf-coat", mesh="sphere").save(tmp_path / "gold.glb")[0])
     assert found["material"]["type"] == "MeshPhysicalMaterial" and found["material"]["metalness"] == 1
     assert found["material"]["clearcoat"] == pytest.approx(1, abs=1e-3)
     assert found["material"]["clearcoatRoughness"] == pytest.approx(0.2, abs=0.02)

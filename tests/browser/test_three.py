@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator
 from pathlib import Path
 
 import chromium
@@ -12,59 +11,46 @@ import numpy as np
 import pytest
 
 import velatura as vt
-from velatura.model import named
-from velatura.model.side_by_side import SideBySide
-from velatura.stack import Material
 
 pytestmark = pytest.mark.skipif(bool(chromium.missing()), reason=chromium.missing())
 
 SIZE, TILT = 24, 0.6
 
 
-@pytest.fixture(scope="module")
-def stage() -> Iterator[in_three.Stage]:
-    if not in_three.THREE.folder.is_dir():
-        pytest.skip(f"three.js is missing: npm ci in {in_three.bundle.SOURCES}")
-    with in_three.stage() as opened:
-        yield opened
-
-
 @pytest.mark.parametrize(("preset", "most"), [("varnished-paint", 0.03), ("coated-gold", 0.05)])
-def test_environments_light_a_ball_as_the_model_says(stage: in_three.Stage, preset: str, most: float) -> None:
+def test_environments_light_a_ball_as_the_model_says(three: in_three.Stage, preset: str, most: float) -> None:
     """Expected: the mean of 1,024 samples for each pixel, within .03 of white as displays have it, .05 where layers are
     brushed."""
     expected = in_three.sampled(preset, in_three.softbox(), SIZE, 1024, TILT)
-    found = stage.ball(vt.export(preset, "three").text, in_three.softbox(), SIZE, tilt=TILT)
+    found = three.ball(vt.export(preset, "three").text, in_three.softbox(), SIZE, tilt=TILT)
     assert in_three.matched(expected, found) < most
 
 
-def test_lights_meet_the_model_itself(stage: in_three.Stage) -> None:
+def test_lights_meet_the_model_itself(three: in_three.Stage) -> None:
     """Expected: values in NumPy, within 5 % in a highlight on a mesh, with texels in half precision; a light of
     intensity 1 has irradiance 1 for a surface that faces it."""
     light = np.array([0.5, 0.6, 0.6]) / np.linalg.norm([0.5, 0.6, 0.6])
-    found = stage.ball(vt.export("glossy-plastic", "three").text, in_three.softbox(), SIZE, light=tuple(light))
-    body = SideBySide.of([(1, Material.of(vt.preset("glossy-plastic")))], named("velatura"))
-    for row, column in [(12, 12), (8, 14), (5, 12), (15, 6)]:
-        frame = in_three.frame_at(row, column, SIZE)
-        value, _ = body.eval_pdf(tuple(frame[:, 2, None]), tuple((frame @ light)[:, None]))
-        np.testing.assert_allclose(found[row, column, :3], np.ravel(value), rtol=0.05, atol=1e-3)
+    found = three.ball(vt.export("glossy-plastic", "three").text, in_three.softbox(), SIZE, light=tuple(light))
+    pixels = [(12, 12), (8, 14), (5, 12), (15, 6)]
+    expected = in_three.by_the_model("glossy-plastic", light, pixels, SIZE)
+    np.testing.assert_allclose([found[row, column, :3] for row, column in pixels], expected, rtol=0.05, atol=1e-3)
 
 
-def test_mixtures_are_sums_of_their_parts(stage: in_three.Stage) -> None:
+def test_mixtures_are_sums_of_their_parts(three: in_three.Stage) -> None:
     """Expected: a third of one picture and two thirds of the other; a hostile name changes nothing."""
     one, other = vt.Stack([vt.Diffuse(albedo=0.8)]), vt.Stack([vt.Interface(eta=1.5, k=3, alpha=0.3)])
     mixed = vt.Mix([(1 / 3, one), (None, other)], name="`${alert(1)}` \\ */ '\"")
-    pictures = [stage.ball(vt.export(each, "three").text, in_three.softbox(), SIZE) for each in (mixed, one, other)]
+    pictures = [three.ball(vt.export(each, "three").text, in_three.softbox(), SIZE) for each in (mixed, one, other)]
     np.testing.assert_allclose(pictures[0], pictures[1] / 3 + pictures[2] * 2 / 3, atol=5e-3)
 
 
-def test_the_page_of_the_manual_draws(stage: in_three.Stage) -> None:
+def test_the_page_of_the_manual_draws(three: in_three.Stage) -> None:
     """Expected: the page as it is printed draws the material, with no complaint on its console; its copies of three.js
     are those of the editor's page."""
     manual = Path(__file__).parents[2] / "docs" / "how-to" / "in-my-engine.md"
     page, _ = re.findall(r"```html\n(.*?)```", manual.read_text(encoding="utf-8"), re.DOTALL)
-    stage.files.update({"gold.js": vt.export("bare-gold", "three", "bati2021").text, "page.html": page})
-    picture, complaints = stage.visit("page.html")
+    three.files.update({"gold.js": vt.export("bare-gold", "three", "bati2021").text, "page.html": page})
+    picture, complaints = three.visit("page.html")
     assert not complaints
     red, _, blue = picture[picture.sum(axis=-1) > 0].mean(axis=0)
     assert red > 1.2 * blue

@@ -5,7 +5,7 @@ from __future__ import annotations
 import base64
 import io
 import re
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
@@ -198,6 +198,14 @@ def frame_at(row: int, column: int, size: int) -> Array:
     n = np.array([x, y, np.sqrt(1 - x * x - y * y)])
     t = np.cross([0, 1, 0], n)
     return np.stack([t / np.linalg.norm(t), np.cross(n, t) / np.linalg.norm(t), n])
+
+
+def by_the_model(material: MaterialLike, light: Array, pixels: Sequence[tuple[int, int]], size: int) -> Array:
+    """Values of the model (pixels, 3) at rows and columns of the ball, for light from a direction."""
+    body = SideBySide.of([(1, Material.of(vt.load(material)))], named("velatura"))
+    frames = [frame_at(row, column, size) for row, column in pixels]
+    values = (body.eval_pdf(tuple(frame[:, 2, None]), tuple((frame @ light)[:, None]))[0] for frame in frames)
+    return np.array([np.ravel(value) for value in values])
 
 
 def radiance(sky: Array) -> bytes:

@@ -1,5 +1,6 @@
 """Functions over many samples: the same by NumPy and by a kernel; and results that are kept."""
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any
 
@@ -47,6 +48,14 @@ def by_kernels(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(compiled, "MANY", -1)
     monkeypatch.setattr(compiled, "MANY_DEPOSITED", -1)
     monkeypatch.setattr(compiled, "LEAST", 0)
+
+
+def either_way(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
+    """By NumPy, then by kernels."""
+    monkeypatch.setattr(compiled, "LEAST", 1 << 60)
+    yield
+    by_kernels(monkeypatch)
+    yield
 
 
 ROWS = 9
@@ -128,11 +137,7 @@ def test_another_number_or_address_needs_no_other_kernel(monkeypatch: pytest.Mon
 def test_lobes_are_the_same_by_numpy_and_by_kernels(monkeypatch: pytest.MonkeyPatch) -> None:
     stacks = [vt.load(name) for name in ("coated-gold", "pearl-lacquer", "frosted-glass")]
     found = []
-    for kernels in (False, True):
-        if kernels:
-            by_kernels(monkeypatch)
-        else:
-            monkeypatch.setattr(compiled, "LEAST", 1 << 60)
+    for _ in either_way(monkeypatch):
         KEPT.clear()
         lobes = [vt.lobes(stack, [1.0, 0.5, 0.1], 0.3) for stack in stacks]
         found.append([(each.energy, each.alpha) for each in lobes])
@@ -147,11 +152,7 @@ def test_the_symmetric_form_is_the_same_by_numpy_and_by_kernels(monkeypatch: pyt
     brushed = Stack([Interface(eta=1.5, alpha=0.1), Interface(alpha=(0.1, 0.3), eta=0.2, k=3.0)])
     monkeypatch.setattr(reciprocal_balance, "SAMPLES", {0: 64})
     found = []
-    for kernels in (False, True):
-        if kernels:
-            by_kernels(monkeypatch)
-        else:
-            monkeypatch.setattr(compiled, "LEAST", 1 << 60)
+    for _ in either_way(monkeypatch):
         for stack in (glass, brushed):
             material = Material.of(stack).solid()
             body = solve(material, named("velatura", form="symmetric"), variance_kind(material), Context())

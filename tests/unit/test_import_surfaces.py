@@ -423,7 +423,7 @@ def test_a_coat_without_darkening_is_a_clearcoat(weight: float) -> None:
 
 def test_a_coat_of_gltf_has_index_colour_darkening_and_brushing() -> None:
     """Expected: those of the coat of OpenPBR, which has the same terms, on a base whose index counts from the coat's;
-    alpha and angle follow the base's own brushing; a coat of weight 0 is left out, whatever its colour."""
+    alpha and angle follow the base's own brushing; a coat of weight 0 is left out, in any colour."""
     coat = {"coatFactor": 1, "coatRoughnessFactor": 0.3, "coatIor": 1.7, "coatColorFactor": [0.9, 0.5, 0.2]}
     brushed = {"coatAnisotropyStrength": 0.5, "coatAnisotropyRotation": np.pi / 6}
     found: Any = coated(coat={**coat, **brushed}).stack

@@ -8,13 +8,9 @@ from __future__ import annotations
 
 import hashlib
 
-from velatura.errors import remark
 from velatura.exports import real_time
-from velatura.exports.request import Export, Request, origin
-from velatura.exports.shader import facts_of
-from velatura.shader.material import title
+from velatura.exports.request import Export, Request
 from velatura.shader.printers.glsl import Glsl
-from velatura.shader.program import described
 
 
 def write(request: Request) -> Export:
@@ -23,25 +19,17 @@ def write(request: Request) -> Export:
     Raises:
         InvalidInput: a material with textures.
     """
-    printer = Glsl(half=True)
-    made, around = real_time.lit(request, printer), real_time.environment(request)
-    code = [real_time.without_comments(text) for text in (made.code, made.frame, around.text)]
-    text = _MODULE.format(
-        name=remark(title(request.material)),
-        model=described(request.model),
-        origin=origin(),
-        title=real_time.string(title(request.material)),
-        digest=hashlib.sha256("".join(code).encode()).hexdigest()[:16],
+    made, around = real_time.lit(request, Glsl(half=True)).bare, real_time.environment(request).bare
+    code = made.code + made.frame + around.text
+    return real_time.module(
+        _MODULE,
+        request,
+        made,
+        around,
+        "layeredMaterial",
+        digest=hashlib.sha256(code.encode()).hexdigest()[:16],
         culled=str(not made.two_sided).lower(),
         above="" if made.two_sided else "\n    vt_wi = normalize(vec3(vt_wi.xy, max(vt_wi.z, 1e-3)));",
-        code=real_time.template(code[0]),
-        frame=real_time.template(code[1]),
-        environment=real_time.template(code[2]),
-        unpacked=real_time.UNPACKED,
-        textures=real_time.stored({"vt_parts": around.texture, **made.textures}),
-    )
-    return Export(
-        text, facts={**facts_of(made.shader, printer.language, request.folder), "exports": ["layeredMaterial", "code"]}
     )
 
 

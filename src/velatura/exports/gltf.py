@@ -5,7 +5,6 @@ from __future__ import annotations
 import base64
 import json
 import re
-import struct
 from collections.abc import Mapping
 from dataclasses import replace
 from functools import partial
@@ -21,7 +20,7 @@ from velatura.errors import InvalidInput
 from velatura.exports import baked
 from velatura.exports.request import Export, Request
 from velatura.programs.gltf import file
-from velatura.programs.gltf.images import inline as decoded
+from velatura.programs.gltf.images import data_of
 from velatura.stack.schema import unknown
 
 if TYPE_CHECKING:
@@ -128,7 +127,9 @@ def _of_file(path: Path) -> tuple[dict[str, Any], bytearray]:
     buffer, starts = bytearray(), []
     try:
         for number, each in enumerate(document.get("buffers", ())):
-            starts.append(_view(buffer, _data(path, number, each, chunk))["byteOffset"])
+            where = f"{path}: buffer {number}"
+            data = data_of(where, each, None if number else chunk, partial(_beside, path.parent, where))
+            starts.append(_view(buffer, data)["byteOffset"])
         views = [dict(each) for each in document.get("bufferViews", ())]
         for view in views:
             view["byteOffset"] = view.get("byteOffset", 0) + starts[view["buffer"]]
@@ -149,19 +150,11 @@ def _of_file(path: Path) -> tuple[dict[str, Any], bytearray]:
     return {**document, "bufferViews": views}, buffer
 
 
-def _data(path: Path, number: int, buffer: Mapping[str, Any], chunk: bytes | None) -> bytes:
-    """The data of a buffer, inside the file or in one beside it, which is copied: none from elsewhere."""
-    uri = buffer.get("uri")
-    if isinstance(uri, str) and not uri.startswith("data:"):
-        beside = unquote(uri)
-        if ":" in beside or Path(beside).is_absolute() or ".." in Path(beside).parts:
-            raise InvalidInput(f"{path}: buffer {number}: must lie below the folder of the file")
-        return files.content(path.parent / beside)
-    if uri is None and number == 0 and chunk is not None:
-        return chunk
-    if not isinstance(uri, str):
-        raise InvalidInput(f"{path}: buffer {number}: has no data")
-    return decoded(f"{path}: buffer {number}", uri)
+def _beside(folder: Path, where: str, name: str) -> bytes:
+    """The content of a file below a folder, which is copied: none from elsewhere."""
+    if ":" in name or Path(name).is_absolute() or ".." in Path(name).parts:
+        raise InvalidInput(f"{where}: must lie below the folder of the file")
+    return files.content(folder / name)
 
 
 # Buffers -------------------------------------------------------------------------------------------------------------
@@ -195,9 +188,4 @@ def _packed(document: Mapping[str, Any], buffer: bytearray, folder: Path) -> byt
         inside.append({"name": path.stem, "bufferView": len(views), "mimeType": kind})
         views.append(_view(buffer, files.content(path)))
     document = {**document, **({"images": inside, "bufferViews": views} if inside else {})}
-    text = _json(_with_buffer(document, buffer)).encode()
-    chunks = [(b"JSON", text + b" " * (-len(text) % 4))]
-    if buffer:
-        chunks.append((b"BIN\0", bytes(buffer) + b"\0" * (-len(buffer) % 4)))
-    body = b"".join(struct.pack("<I", len(data)) + kind + data for kind, data in chunks)
-    return b"glTF" + struct.pack("<II", 2, 12 + len(body)) + body
+    return file.packed(_json(_with_buffer(document, buffer)).encode(), bytes(buffer))

@@ -6,7 +6,6 @@ Godot hands its filtered sky to no shader of a surface, so that only lights are 
 
 from __future__ import annotations
 
-import base64
 import json
 import re
 from dataclasses import dataclass
@@ -45,15 +44,15 @@ def write(request: Request) -> Export:
         InvalidInput: a material with textures.
     """
     printer = GodotShading(half=True)
-    made = real_time.lit(request, printer)
+    made = real_time.lit(request, printer).bare
     shading = _SHADER.format(
         model=described(request.model),
         origin=origin(),
         culled="cull_disabled" if made.two_sided else "cull_back",
         outwards="FRONT_FACING ? NORMAL : -NORMAL" if made.two_sided else "NORMAL",
         above="" if made.two_sided else "\n    wi = normalize(vec3(wi.xy, max(wi.z, 1e-3)));",
-        code=real_time.without_comments(made.code).strip(),
-        frame=real_time.without_comments(made.frame).replace("mat3 vt_frame;", "", 1).strip(),
+        code=made.code.strip(),
+        frame=made.frame.replace("mat3 vt_frame;", "", 1).strip(),
     )
     images = "".join(_image(name, texels) for name, texels in made.textures.items())
     named = "".join(f'shader_parameter/{name} = SubResource("{name}")\n' for name in made.textures)
@@ -66,8 +65,7 @@ def write(request: Request) -> Export:
 def _image(name: str, texels: np.ndarray) -> str:
     """A texture of halves of floats, and its image."""
     height, width, _ = texels.shape
-    data = base64.b64encode(np.ascontiguousarray(texels, "<f2").tobytes()).decode()
-    return _IMAGE.format(name=name, width=width, height=height, data=data)
+    return _IMAGE.format(name=name, width=width, height=height, data=real_time.halves(texels))
 
 
 def _products(code: str) -> str:

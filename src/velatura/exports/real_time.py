@@ -10,17 +10,20 @@ import base64
 import json
 import re
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
-from velatura.errors import InvalidInput
-from velatura.exports.request import Request
+from velatura.errors import InvalidInput, remark
+from velatura.exports.request import Export, Request, origin
+from velatura.exports.shader import facts_of
 from velatura.model.variance import Isotropic
 from velatura.shader import Shader, prefiltered, shader
 from velatura.shader.closures import shares
+from velatura.shader.material import title
 from velatura.shader.prefiltered import ROUND, Prefiltered
 from velatura.shader.printers.glsl import Glsl
+from velatura.shader.program import described
 from velatura.shader.recorder import recording
 from velatura.stack import Material, Varying
 
@@ -36,6 +39,11 @@ class Environment:
     text: str
     texture: np.ndarray
 
+    @property
+    def bare(self) -> Environment:
+        """The same without comments."""
+        return replace(self, text=_without_comments(self.text))
+
 
 @dataclass(frozen=True)
 class Lit:
@@ -47,6 +55,11 @@ class Lit:
     frame: str
     textures: Mapping[str, np.ndarray]
     two_sided: bool
+
+    @property
+    def bare(self) -> Lit:
+        """The same without comments, in which a preprocessor might read names of materials."""
+        return replace(self, code=_without_comments(self.code), frame=_without_comments(self.frame))
 
 
 def lit(request: Request, printer: Glsl) -> Lit:
@@ -100,26 +113,50 @@ def _part_lines(share: float, found: Prefiltered, first: int) -> Iterator[str]:
         yield f"    {where}sum += {share:.6f} * vt_part({line}, ivec2({cosines}, {turns}), wi, {side}, {taps});"
 
 
-def without_comments(code: str) -> str:
-    """Code in GLSL without its comments, in which a preprocessor might read names of materials."""
+def _without_comments(code: str) -> str:
     return re.sub(r"\n\s*\n+", "\n", re.sub(r"[ \t]*//[^\n]*", "", code))
 
 
-def stored(textures: Mapping[str, np.ndarray]) -> str:
-    """Textures as halves of floats in JavaScript: entries of an object, each with width, height and data in base64."""
-    halves = {name: np.ascontiguousarray(texels, "<f2") for name, texels in textures.items()}
-    return "".join(
-        f"  {name}: [{texels.shape[1]}, {texels.shape[0]}, '{base64.b64encode(texels.tobytes()).decode()}'],\n"
-        for name, texels in halves.items()
+def halves(texels: np.ndarray) -> str:
+    """A texture as halves of floats, in base64."""
+    return base64.b64encode(np.ascontiguousarray(texels, "<f2").tobytes()).decode()
+
+
+# Modules of JavaScript -----------------------------------------------------------------------------------------------
+
+
+def module(template: str, request: Request, made: Lit, around: Environment, maker: str, **own: str) -> Export:
+    """A module by its template, which exports `code` and a `maker` of materials; it holds its textures, as halves of
+    floats. `own` are fields of this template alone."""
+    text = template.format(
+        name=remark(title(request.material)),
+        model=described(request.model),
+        origin=origin(),
+        title=_string(title(request.material)),
+        code=_literal(made.code),
+        frame=_literal(made.frame),
+        environment=_literal(around.text),
+        unpacked=_UNPACKED,
+        textures="".join(
+            _stored(name, texels) for name, texels in {"vt_parts": around.texture, **made.textures}.items()
+        ),
+        **own,
     )
+    facts = facts_of(made.shader, Glsl.language, request.folder)
+    return Export(text, facts={**facts, "exports": [maker, "code"]})
 
 
-def template(text: str) -> str:
-    """A text within a template literal of JavaScript."""
+def _stored(name: str, texels: np.ndarray) -> str:
+    """A texture as an entry of an object, with width, height and data."""
+    return f"  {name}: [{texels.shape[1]}, {texels.shape[0]}, '{halves(texels)}'],\n"
+
+
+def _literal(text: str) -> str:
+    """A text within a template literal."""
     return text.replace("\\", "\\\\").replace("`", "\\`").replace("${", "\\${").strip("\n")
 
 
-def string(text: str) -> str:
+def _string(text: str) -> str:
     """A string of JavaScript, without trigraphs for those who read it as C."""
     return json.dumps(text, ensure_ascii=False).replace("?", "\\u003f")
 
@@ -208,7 +245,7 @@ vec3 vt_environment(vec3 wi) {{
 }}
 """
 
-UNPACKED = """\
+_UNPACKED = """\
 /** The textures of the module: names with width, height and halves of floats. */
 function unpacked() {
   return Object.entries(stored).map(([name, [width, height, data]]) => {

@@ -6,13 +6,9 @@ prefiltered. Its code is that of `velatura.exports.real_time`.
 
 from __future__ import annotations
 
-from velatura.errors import remark
 from velatura.exports import real_time
-from velatura.exports.request import Export, Request, origin
-from velatura.exports.shader import facts_of
-from velatura.shader.material import title
+from velatura.exports.request import Export, Request
 from velatura.shader.printers.glsl import Glsl
-from velatura.shader.program import described
 
 
 def write(request: Request) -> Export:
@@ -21,23 +17,9 @@ def write(request: Request) -> Export:
     Raises:
         InvalidInput: a material with textures.
     """
-    printer = Glsl(half=True)
-    made, around = real_time.lit(request, printer), real_time.environment(request)
-    text = _MODULE.format(
-        name=remark(title(request.material)),
-        model=described(request.model),
-        origin=origin(),
-        title=real_time.string(title(request.material)),
-        sided="DoubleSide" if made.two_sided else "FrontSide",
-        code=real_time.template(made.code),
-        frame=real_time.template(made.frame),
-        environment=real_time.template(around.text),
-        unpacked=real_time.UNPACKED,
-        textures=real_time.stored({"vt_parts": around.texture, **made.textures}),
-    )
-    return Export(
-        text, facts={**facts_of(made.shader, printer.language, request.folder), "exports": ["LayeredMaterial", "code"]}
-    )
+    made, around = real_time.lit(request, Glsl(half=True)), real_time.environment(request)
+    sided = "DoubleSide" if made.two_sided else "FrontSide"
+    return real_time.module(_MODULE, request, made, around, "LayeredMaterial", sided=sided)
 
 
 _MODULE = """\

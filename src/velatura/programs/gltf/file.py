@@ -214,6 +214,15 @@ def _parts(path: Path, data: bytes) -> tuple[str, bytes | None]:
     return files.decoded(data[20 : 20 + length], path), chunk[8 : 8 + size]
 
 
+def packed(text: bytes, chunk: bytes) -> bytes:
+    """A .glb of the JSON of a document and its binary chunk, without one where that is empty."""
+    chunks = [(_JSON, text + b" " * (-len(text) % 4))]
+    if chunk:
+        chunks.append((_BINARY, chunk + b"\0" * (-len(chunk) % 4)))
+    body = b"".join(struct.pack("<I", len(data)) + kind + data for kind, data in chunks)
+    return _MAGIC + struct.pack("<II", 2, 12 + len(body)) + body
+
+
 def _document(path: Path, text: str) -> Mapping[str, Any]:
     if len(text) > LARGEST:
         raise InvalidInput(f"{path}: holds more than {LARGEST >> 20} MiB of JSON")

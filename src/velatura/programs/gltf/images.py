@@ -5,7 +5,7 @@ from __future__ import annotations
 import base64
 import binascii
 import io
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
 from urllib.parse import unquote
@@ -66,14 +66,8 @@ class Images:
     def _buffer(self, index: Any) -> bytes:
         buffer, where = self._entry("buffers", index), f"buffer {show(index)}"
         if index not in self._buffers:
-            uri = buffer.get("uri")
-            if uri is None and index == 0 and self._chunk is not None:
-                self._buffers[index] = self._chunk
-            elif not isinstance(uri, str):
-                raise InvalidInput(f"{where}: has no data")
-            else:
-                inside = uri.startswith("data:")
-                self._buffers[index] = inline(where, uri) if inside else files.content(self._path.parent / unquote(uri))
+            chunk = self._chunk if index == 0 else None
+            self._buffers[index] = data_of(where, buffer, chunk, lambda name: files.content(self._path.parent / name))
         return self._buffers[index]
 
     def _entry(self, part: str, index: object) -> Mapping[str, Any]:
@@ -91,6 +85,20 @@ def _count(where: str, view: Mapping[str, Any], key: str) -> int:
     if type(value) is not int or value < 0:
         raise InvalidInput(f"{where}: {key}: must be a number of bytes, got {show(value)}")
     return value
+
+
+def data_of(where: str, buffer: Mapping[str, Any], chunk: bytes | None, beside: Callable[[str], bytes]) -> bytes:
+    """The data of a buffer: inside the document, in the binary chunk, or by its name that of a file `beside`.
+
+    Raises:
+        InvalidInput: it has none, or what is inside is not whole.
+    """
+    uri = buffer.get("uri")
+    if uri is None and chunk is not None:
+        return chunk
+    if not isinstance(uri, str):
+        raise InvalidInput(f"{where}: has no data")
+    return inline(where, uri) if uri.startswith("data:") else beside(unquote(uri))
 
 
 def inline(where: str, uri: str) -> bytes:
