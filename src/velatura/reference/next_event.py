@@ -106,10 +106,7 @@ def way_out(types: Any, layers: WalkedLayers, wo: Direction, rng: Any, turns: Va
             crossings.append(_Crossing(smooth, 0.0, mirrored, 0.0, above, 0.0))
             break
         # Refract into the next slab
-        if layers.microsurface:
-            inward, rng = facets.sample_refraction(types, meeting, rng)
-        else:
-            inward = events.sample_refraction(meeting, rng.next_float32(), rng.next_float32())
+        inward, rng = _refracted(types, meeting, rng)
         w.append((-inward.wo[0], -inward.wo[1], ops.maximum(-inward.wo[2], _GRAZING)))
         spread.append(spread[k] * w[k][2] / (meeting.eta * meeting.eta * w[k + 1][2]))
         below = transmittance(layers.slabs[k + 1], w[k + 1][2])
@@ -151,15 +148,19 @@ def _way_back(
     for k in range(layers.count - 2, 0, -1):
         x, y, z = back[0].w
         meeting = SurfaceMeeting(layers, k, layers.index[k + 1], layers.index[k], (-x, -y, z), False)
-        if layers.microsurface:
-            outward, rng = facets.sample_refraction(types, meeting, rng)
-        else:
-            outward = events.sample_refraction(meeting, rng.next_float32(), rng.next_float32())
+        outward, rng = _refracted(types, meeting, rng)
         x, y, z = outward.wo
         passed = transmittance(layers.slabs[k + 1], back[0].w[2])
         below = replace(back[0], carried=back[0].carried * passed)
         back.insert(0, _after(meeting, replace(outward, wo=(x, y, -z)), below))
     return tuple(back), rng
+
+
+def _refracted(types: Any, meeting: SurfaceMeeting, rng: Any) -> tuple[events.ScatteringEvent, Any]:
+    """A refraction without a choice, between facets where light meets them often; also the random numbers, advanced."""
+    if meeting.layers.microsurface:
+        return facets.sample_refraction(types, meeting, rng)
+    return events.sample_refraction(meeting, rng.next_float32(), rng.next_float32()), rng
 
 
 def _after(meeting: SurfaceMeeting, event: ScatteringEvent, way: WayBack) -> WayBack:

@@ -113,14 +113,11 @@ def _reader(stage: Any, shade: Any, place: str, path: Path, elsewhere: list[str]
 
 def _network(shade: Any, prim: Any, path: Path) -> tuple[str, list[Shader]]:
     """The name of a material's surface, that of MaterialX before the other, and the shaders that it takes from."""
-    for context in ("mtlx", ""):
-        surface, *_ = shade.Material(prim).ComputeSurfaceSource(context)
-        if surface and surface.GetIdAttr().Get():
-            break
-    else:
+    waiting = [shade.Material(prim).ComputeSurfaceSource(context)[0] for context in ("mtlx", "")]
+    surface = next((each for each in waiting if each and each.GetIdAttr().Get()), None)
+    if surface is None:
         raise InvalidInput(f"{path}: material {prim.GetName()}: has no surface that is read here")
     found: dict[str, Shader] = {}
-    waiting = [shade.Material(prim).ComputeSurfaceSource(each)[0] for each in ("mtlx", "")]
     with files.budget() as left:
         while waiting:
             shader = waiting.pop()
