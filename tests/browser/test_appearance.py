@@ -75,6 +75,28 @@ def answered(visit: Visit) -> None:
     visit.page.wait_for_function("() => !velatura.store.dragging")
 
 
+def drag(slider: Any, ticks: tuple[int, ...]) -> None:
+    """Drag a slider over its ticks as a hand does: a change follows where it is let go."""
+    for tick in ticks:
+        slider.evaluate("(slider, tick) => (slider.value = tick)", tick)
+        slider.dispatch_event("input")
+    slider.dispatch_event("change")
+
+
+# Moves a slider and lets go, and does so once more when the first answer, an approximate one, is drawn
+DRAG_AGAIN = """(slider, [first, second]) => new Promise((done) => {
+  const move = (tick) => {
+    slider.value = tick;
+    for (const type of ['input', 'change']) slider.dispatchEvent(new Event(type, { bubbles: true }));
+  };
+  const stop = velatura.store.subscribe(() => {
+    stop();
+    requestAnimationFrame(() => requestAnimationFrame(() => done(move(second))));
+  });
+  move(first);
+})"""
+
+
 def chosen(visit: Visit, lobe: int) -> None:
     visit.page.locator(".lobe").nth(lobe - 1).click()
     visit.page.get_by_text(f"Class of lobe {lobe}").wait_for()
@@ -169,8 +191,7 @@ def test_a_visit_from_blur_to_class_to_coat(visit: Open, served: Server) -> None
     chosen(page, 2)
     before = steps(page)
     blur = look.get_by_label("Blur, slider")
-    for tick in (88, 80, 70):
-        blur.fill(str(tick))
+    drag(blur, (88, 80, 70))
     answered(page)
     assert lobes(page).alpha[-1][0, 0] == pytest.approx(0.35, abs=1e-4)
     assert float(np.mean(np.abs(page.picture() - first))) > SAME
@@ -651,10 +672,9 @@ def test_further_wishes_are_dragged(visit: Open) -> None:
             found.locator("summary").click()
         return found
 
-    def drag(slider: Any, ticks: tuple[int, ...]) -> None:
+    def one_step(slider: Any, ticks: tuple[int, ...]) -> None:
         before = steps(page)
-        for tick in ticks:
-            slider.fill(str(tick))
+        drag(slider, ticks)
         answered(page)
         assert steps(page) == before + 1
 
@@ -663,7 +683,7 @@ def test_further_wishes_are_dragged(visit: Open) -> None:
     before = lobes(page)
     haze = look.get_by_label("Haze, slider")
     most = int(haze.get_attribute("max"))
-    drag(haze, (round(0.8 * most), round(0.5 * most)))
+    one_step(haze, (round(0.8 * most), round(0.5 * most)))
     alpha = float(lobes(page).transmitted.alpha.mean())
     assert alpha**2 / (alpha**2 + np.tan(np.radians(1.25)) ** 2) == pytest.approx(0.5, abs=2e-3)
     assert page.state("layers.1.keys.sigma_a") == pytest.approx([1.0, 0.7, 0.2])
@@ -672,7 +692,7 @@ def test_further_wishes_are_dragged(visit: Open) -> None:
     # A clear pane, which lacks a medium
     look = further("Frosted glass pane")
     look.get_by_role("button", name="Add a tinted medium below layer 0").click()
-    drag(look.get_by_label("Passes: share, slider"), (round(0.6 * most), round(0.4 * most)))
+    one_step(look.get_by_label("Passes: share, slider"), (round(0.6 * most), round(0.4 * most)))
     assert float(lobes(page).passed.mean()) == pytest.approx(0.4, abs=2e-3)
 
     # The colour of a base
@@ -694,7 +714,7 @@ def test_further_wishes_are_dragged(visit: Open) -> None:
     page.page.get_by_label("Model", exact=True).select_option("weier2020")
     look = further("Anodised titanium")
     thickness = page.state("layers.0.keys.films.0.thickness_nm")
-    drag(look.get_by_label("Film, by its thickness: share, slider"), (round(0.3 * most), round(0.4 * most)))
+    one_step(look.get_by_label("Film, by its thickness: share, slider"), (round(0.3 * most), round(0.4 * most)))
     assert page.state("layers.0.keys.films.0.thickness_nm") != pytest.approx(thickness, abs=1)
 
     # Grazing light, which lobes at normal incidence are kept for
@@ -702,16 +722,20 @@ def test_further_wishes_are_dragged(visit: Open) -> None:
     before = lobes(page)
     shown = look.get_by_label("Reflected at a second angle: share, slider")
     tick = int(shown.input_value())
-    drag(shown, (tick - 3, tick - 2))
+    one_step(shown, (tick - 3, tick - 2))
     after = lobes(page)
     assert np.allclose(before.energy, after.energy, atol=2e-3) and np.allclose(before.alpha, after.alpha, atol=2e-3)
     assert int(shown.input_value()) < tick
 
-    # A mixture, by its weights; its parts are wished for one at a time
+    # A mixture, by its weights, taken up again before the step ends; its parts are wished for one at a time
     look = further("Half-metallic paint")
     page.settled()
     pigment = page.state("parts.1.layers.2.keys.albedo")
-    drag(look.get_by_label("Mixture, by its weights: share, slider"), (round(0.1 * most), round(0.2 * most)))
+    share = look.get_by_label("Mixture, by its weights: share, slider")
+    past = steps(page)
+    share.evaluate(DRAG_AGAIN, [round(0.1 * most), round(0.2 * most)])
+    answered(page)
+    assert steps(page) == past + 1
     shares = np.linspace(0, 1, 101)
     paints = [vt.preset("half-metallic-paint").replace(part0_weight=float(share)) for share in (0, 0.5, 1)]
     flakeless, before, flaky = (reflected(vt.lobes(each, 1.0, model="weier2020"))[:, 0] for each in paints)

@@ -147,8 +147,8 @@ export function createWishes({ store, call, edits, messages }, panel) {
     refuse,
   });
 
-  /** A wish as it is asked for while it is held, else as the material has it. */
-  const underHand = (shown) => (held && asked?.key === shown.key ? { ...shown, ...asked.wish } : shown);
+  /** A wish as it is asked for while its step goes on, so that hues do not drift by its answers; else as the material has it. */
+  const underHand = (shown) => (origin && asked?.key === shown.key ? { ...shown, ...asked.wish } : shown);
 
   function row(shown) {
     const { key, energy, haze } = underHand(shown);
