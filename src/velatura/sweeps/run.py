@@ -76,7 +76,12 @@ def sweep(
         MissingTool: the extra `sweep` is not installed; or LLVM is missing on a worker.
         VelaturaError: the engine broke down; what is in the store stays.
     """
-    fields = {key: getattr(space, key) for key in Space.model_fields} if isinstance(space, Space) else dict(space)
+    if isinstance(space, Space):
+        fields = {key: getattr(space, key) for key in Space.model_fields}
+    elif isinstance(space, Mapping):
+        fields = dict(space)
+    else:
+        raise InvalidInput(f"space: must be a Space or its mapping, got {show(space)}")
     plan = Plan.from_dict({**_given(fields), "what": what, "options": options, **({"chunk": chunk} if chunk else {})})
     return carry_out(plan, store, executor, workers, progress, part)
 
