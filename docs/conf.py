@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import sys
+from importlib.metadata import version as version_of
 from importlib.util import find_spec
 from pathlib import Path
 
@@ -11,6 +12,7 @@ sys.path.insert(0, str(Path(__file__).parents[1] / "tools"))  # for docs_hooks
 project = "Velatura"
 author = "The Velatura authors"
 copyright = author
+version = release = version_of("velatura")
 
 extensions = [
     "docs_hooks",
@@ -59,7 +61,7 @@ sphinx_gallery_conf = {
     "remove_config_comments": True,
 }
 
-html_title = "Velatura"
+html_title = f"Velatura {release}"
 html_theme = "pydata_sphinx_theme"
 html_theme_options = {
     "secondary_sidebar_items": ["page-toc", "sg_download_links"],

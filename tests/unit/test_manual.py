@@ -170,3 +170,18 @@ def test_the_retrieved_layers_are_those_of_every_figure(hooks: ModuleType) -> No
     shown = {name.split()[0] for name in FIGURES_OF_LOBES} - {"23"}  # whose stacks are those of 15 (b)
     assert shown <= {name.split()[0] for name in found}
     assert "eta 1.287, alpha 0.0628; depth 0.8227 0.2582 0; eta 2.273, alpha 0.04033" in hooks._retrieved("bati2021")
+
+
+def test_manuals_of_versions_stand_side_by_side(tmp_path: Path) -> None:
+    """Expected: the newest first, by version; one of the same version takes the place of the old one."""
+    keep = tool("keep_manual").keep
+    site, folder = tmp_path / "site", tmp_path / "manual"
+    (site / "bench").mkdir(parents=True)
+    for number, name in enumerate(("0.9.0", "0.10.0", "0.9.0", "1.0rc1")):
+        (site / "index.html").write_text(str(number))
+        keep(site, folder, name)
+    (folder / "notes").mkdir()
+    assert {path.name for path in folder.iterdir()} == {"index.html", "notes", "0.9.0", "0.10.0", "1.0rc1"}
+    assert (folder / "0.9.0" / "index.html").read_text() == "2" and not (folder / "0.9.0" / "bench").exists()
+    listed = re.findall('href="(.+?)/index.html"', (folder / "index.html").read_text())
+    assert listed == ["1.0rc1", "0.10.0", "0.9.0"]

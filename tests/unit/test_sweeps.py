@@ -462,7 +462,7 @@ def test_unknown_questions_and_options_are_refused(tmp_path: Path) -> None:
             swept(GOLD, what, tmp_path / "a.zarr", **options)
         assert message in str(caught.value)
     with pytest.raises(vt.InvalidInput, match=r"^space: must be a Space or its mapping, got 'plan.yaml'$"):
-        vt.sweep("plan.yaml", store=tmp_path / "a.zarr")  # type: ignore[arg-type]
+        vt.sweep("plan.yaml", store=tmp_path / "a.zarr")
 
 
 def test_one_thread_renders_and_the_session_keeps_its_own(tmp_path: Path) -> None:
