@@ -17,6 +17,7 @@ from typing import Any
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "tests" / "shared"))
 
+import chromium
 import editor
 import viewport
 from rows import parsed, row
@@ -196,10 +197,10 @@ def times() -> None:
         row("frame", "in fewer pixels, as while dragging", quick, "ms", f"{found['quick']:.2f} times the {theirs_too}")
 
 
-def dragging(chromium: Any) -> None:
+def dragging(browser: Any) -> None:
     for preset, layer in DRAGGED:
         with tempfile.TemporaryDirectory() as folder, editor.server(Path(folder), preset) as server:
-            page = editor.Visit(chromium.new_page(viewport={"width": 1280, "height": 720}), server.entrance)
+            page = editor.Visit(browser.new_page(viewport={"width": 1280, "height": 720}), server.entrance)
             found: dict[str, list[float]] = {"velatura": [], "belcour2018": []}
             for model in [*found] * TURNS:
                 page.page.evaluate(MODEL, model)
@@ -211,7 +212,7 @@ def dragging(chromium: Any) -> None:
             row("dragging", f"a roughness of {preset}, layer {layer}, {model}", rates, "frames/s")
 
 
-def adding(chromium: Any) -> None:
+def adding(browser: Any) -> None:
     found: dict[bool, list[float]] = {False: [], True: []}
     for preset in ADDED_TO:
         for kind in ("interface", "medium", "diffuse"):
@@ -219,7 +220,7 @@ def adding(chromium: Any) -> None:
                 continue
             for foreseen, times in found.items():
                 with tempfile.TemporaryDirectory() as folder, editor.server(Path(folder), preset) as server:
-                    page = editor.Visit(chromium.new_page(viewport={"width": 1280, "height": 720}), server.entrance)
+                    page = editor.Visit(browser.new_page(viewport={"width": 1280, "height": 720}), server.entrance)
                     page.settled()
                     if foreseen:
                         page.page.evaluate("velatura.viewport.setBudget({ samples: 1 })")
@@ -243,8 +244,8 @@ def main() -> None:
         times()
     for name, measure in (("dragging", dragging), ("adding", adding)):
         if arguments.only in (None, name):
-            with editor.browser() as chromium:
-                measure(chromium)
+            with chromium.launched() as browser:
+                measure(browser)
     if arguments.only in (None, "stills"):
         stills(arguments.size, arguments.samples, arguments.spp)
 

@@ -26,6 +26,7 @@ from rows import parsed
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "tests" / "shared"))
 
+import chromium
 import editor
 from fuzzing import server as fuzzing
 from fuzzing.hands import Hands
@@ -145,7 +146,7 @@ def half_open(port: int, pid: int) -> list[str]:
 
 def edited(minutes: float, seed: int) -> list[str]:
     """Edit in the page by random hands, which look at what has become of it now and then."""
-    with tempfile.TemporaryDirectory() as folder, editor.server(Path(folder)) as server, editor.browser() as opened:
+    with tempfile.TemporaryDirectory() as folder, editor.server(Path(folder)) as server, chromium.launched() as opened:
         render(server)
         visit = editor.Visit(opened.new_page(viewport={"width": 900, "height": 600}), server.entrance)
         hands, end = Hands(visit, Path(folder), seed), time.monotonic() + 60 * minutes

@@ -1,25 +1,45 @@
-"""The editor's server and a browser, for as long as the tests of a file run; pages tell how a failed test left them."""
+"""A browser and the editor's server for all files of this folder; pages tell how a failed test left them."""
 
 from __future__ import annotations
 
+import shutil
 from collections.abc import Callable, Generator, Iterator
 from typing import Any
 
+import chromium
 import in_three
 import pytest
-from editor import Server, Tabs, Visit, browser, server, unexpected
+from editor import Server, Tabs, Visit, server, unexpected
+
+
+@pytest.fixture(scope="package", autouse=True)
+def kept() -> Iterator[None]:
+    """One Chromium for all files, which starts in two seconds."""
+    if chromium.missing():
+        yield
+    else:
+        with chromium.kept():
+            yield
 
 
 @pytest.fixture(scope="module")
 def opened() -> Iterator[Any]:
-    with browser() as found:
+    with chromium.launched() as found:
+        yield found
+
+
+@pytest.fixture(scope="package")
+def running(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Server]:
+    with server(tmp_path_factory.mktemp("materials")) as found:
         yield found
 
 
 @pytest.fixture(scope="module")
-def served(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Server]:
-    with server(tmp_path_factory.mktemp("materials")) as running:
-        yield running
+def served(running: Server) -> Iterator[Server]:
+    """The server, whose folder is empty at first."""
+    yield running
+    for path in running.folder.iterdir():
+        shutil.rmtree(path) if path.is_dir() else path.unlink()
 
 
 @pytest.fixture(scope="module")

@@ -14,7 +14,7 @@ from typing import Any
 
 import chromium
 import pytest
-from editor import browser, require_fresh_page
+from editor import require_fresh_page
 from lab import PATIENCE, Kernel, lab
 
 # Not imported here, since all workers read all files of tests, and jupyterlab and nbformat take seconds
@@ -89,7 +89,7 @@ class Notebook:
 @pytest.fixture(scope="module")
 def notebook(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Notebook]:
     require_fresh_page()
-    with lab(tmp_path_factory.mktemp("lab"), ONE, TWO) as running, browser() as opened:
+    with lab(tmp_path_factory.mktemp("lab"), ONE, TWO) as running, chromium.launched() as opened:
         page = opened.new_page(viewport={"width": 1200, "height": 900})
         complaints: list[str] = []
         page.on("console", lambda message: complaints.append(message.text) if message.type == "error" else None)

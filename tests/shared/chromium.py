@@ -144,15 +144,49 @@ def path() -> str | None:
 
 @contextmanager
 def browser() -> Iterator[Browser]:
-    """Chromium for as long as the block runs."""
+    """A page of Chromium for as long as the block runs."""
+    with launched() as chromium:
+        yield Browser(chromium.new_page())
+
+
+@contextmanager
+def launched() -> Iterator[Any]:
+    """Chromium for as long as the block runs, or the one that is kept; pages that are opened there end with the block.
+
+    Playwright cannot be started twice in a thread.
+    """
     from playwright.sync_api import sync_playwright
 
+    if _kept:
+        (chromium,) = _kept
+        before = chromium.contexts
+        try:
+            yield chromium
+        finally:
+            for context in chromium.contexts:
+                if context not in before:
+                    context.close()
+        return
     with sync_playwright() as playwright:
         chromium = playwright.chromium.launch(executable_path=path(), args=FLAGS.split())
         try:
-            yield Browser(chromium.new_page())
+            yield chromium
         finally:
             chromium.close()
+
+
+@contextmanager
+def kept() -> Iterator[None]:
+    """One Chromium for all that is `launched` within the block."""
+    with launched() as chromium:
+        _kept.append(chromium)
+        try:
+            yield
+        finally:
+            _kept.remove(chromium)
+
+
+_kept: list[Any] = []
 
 
 def _text(data: np.ndarray) -> str:

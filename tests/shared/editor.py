@@ -13,7 +13,6 @@ from pathlib import Path
 from typing import Any, ClassVar
 from urllib.parse import urlsplit
 
-import chromium
 import numpy as np
 
 from velatura.editor import bundle, guard
@@ -243,16 +242,3 @@ def unexpected(visits: Iterable[Visit], expected: Iterable[str]) -> list[str]:
     """Complaints of the consoles of pages, without messages that contain an expected text."""
     known = list(expected)
     return [text for found in visits for text in found.complaints if not any(part in text for part in known)]
-
-
-@contextmanager
-def browser() -> Iterator[Any]:
-    """Chromium for as long as the block runs."""
-    from playwright.sync_api import sync_playwright
-
-    with sync_playwright() as playwright:
-        opened = playwright.chromium.launch(executable_path=chromium.path(), args=chromium.FLAGS.split())
-        try:
-            yield opened
-        finally:
-            opened.close()

@@ -105,24 +105,16 @@ def stage(width: int, height: int, exports: str = "") -> Iterator[Stage]:
 
     `exports` are statements of JavaScript; what they export is in `page` as well.
     """
-    from playwright.sync_api import sync_playwright
-
-    with sync_playwright() as playwright:
-        browser = playwright.chromium.launch(executable_path=chromium.path(), args=chromium.FLAGS.split())
-        try:
-            opened = Stage(browser.new_page(viewport={"width": max(width, 200), "height": max(height, 200)}))
-            page = opened.page
-            page.on("pageerror", lambda error: opened.errors.append(str(error)))
-            page.on("console", lambda line: opened.errors.append(line.text) if line.type == "error" else None)
-            page.expose_function("answer", lambda verb, body: service.VERBS[verb](body))
-            page.set_content(
-                f"<canvas width={width} height={height} style='width:{width}px;height:{height}px'></canvas>"
-            )
-            page.add_script_tag(content=script(_ENTRY + exports))
-            page.evaluate(_OPEN, views.printed(DEFAULT_VIEW))
-            yield opened
-        finally:
-            browser.close()
+    with chromium.launched() as browser:
+        opened = Stage(browser.new_page(viewport={"width": max(width, 200), "height": max(height, 200)}))
+        page = opened.page
+        page.on("pageerror", lambda error: opened.errors.append(str(error)))
+        page.on("console", lambda line: opened.errors.append(line.text) if line.type == "error" else None)
+        page.expose_function("answer", lambda verb, body: service.VERBS[verb](body))
+        page.set_content(f"<canvas width={width} height={height} style='width:{width}px;height:{height}px'></canvas>")
+        page.add_script_tag(content=script(_ENTRY + exports))
+        page.evaluate(_OPEN, views.printed(DEFAULT_VIEW))
+        yield opened
 
 
 @dataclass(frozen=True)
