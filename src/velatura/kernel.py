@@ -214,6 +214,17 @@ def llvm() -> ModuleType | None:
 
 
 @functools.cache
+def vector_width() -> int:
+    """How many values Dr.Jit's kernels of LLVM work on at once: as many as the processor's instructions allow."""
+    import numpy as np
+
+    found = np.show_config(mode="dicts")["SIMD Extensions"]
+    known = {*found["baseline"], *found["found"]}
+    widths = {16: {"X86_V4", "AVX512_SKX"}, 8: {"X86_V3", "AVX2"}}  # as NumPy has named them since, and before, 2.4
+    return next((width for width, names in widths.items() if names & known), 4)
+
+
+@functools.cache
 def _llvm_works() -> bool:
     version = llvm_version()
     if version is None or version[0] >= TRUSTED_LLVM:

@@ -9,6 +9,7 @@ import pytest
 
 import velatura as vt
 from velatura import ops
+from velatura.kernel import vector_width
 from velatura.model import named
 from velatura.model.context import Context
 from velatura.model.rough_interface import KEPT
@@ -64,7 +65,8 @@ SAMPLES = [np.linspace(0.0, 1.0, 5)]
 
 
 def test_kernels_and_numpy_agree(monkeypatch: pytest.MonkeyPatch) -> None:
-    for count in (7, 64, 1):
+    for count, shared in ((7, compiled.SHARED), (64, compiled.SHARED), (64, 0), (1, 0)):
+        monkeypatch.setattr(compiled, "SHARED", shared)
         sources = [np.linspace(0.1, 1.0, count)]
         sums, largest, (light,) = compiled.over(function, sources, SAMPLES, numbers(), ROWS)
         with monkeypatch.context() as patched:
@@ -76,6 +78,16 @@ def test_kernels_and_numpy_agree(monkeypatch: pytest.MonkeyPatch) -> None:
     product = sources[0][:, None] * SAMPLES[0]
     assert largest[0] == pytest.approx((0.7 * np.cos(product) + 0.25).max(axis=1), abs=1e-15)
     assert sums[2] == pytest.approx(0.9 * product.sum(axis=1), abs=1e-14)
+
+
+def test_one_thread_takes_as_many_sources_as_dr_jit_s_vectors_hold() -> None:
+    import drjit as dr
+
+    vt.bsdf(vt.load("coated-gold"))
+    with dr.scoped_set_flag(dr.JitFlag.KernelHistory, True):
+        dr.eval(dr.arange(dr.llvm.UInt32, 3) * 5)
+        written = dr.kernel_history([dr.KernelType.JIT])[-1]["ir"].getvalue()
+    assert f"<{vector_width()} x i32>" in written
 
 
 def read(sources: Any, samples: Any, numbers: Any) -> Found:

@@ -32,6 +32,7 @@ Array = NDArray[Any]
 MANY = 50_000  # values of a kind, about half as long as a kernel of it takes to compile where none is kept on disk
 MANY_DEPOSITED = 150_000  # likewise of kinds with light that falls on rows, whose kernels are longer
 LEAST = 2_000  # values at a time: for fewer, a kernel takes longer to launch than NumPy to run
+SHARED = 2_000_000  # values at a time, from which several threads run a kernel; see `_lanes`
 BLOCK = 1 << 15  # values at a time, which a processor's cache holds
 COLOURS = 3
 KERNELS = 64  # kinds whose launches are kept
@@ -163,9 +164,11 @@ class _Read(NamedTuple):
 
 @dataclass(frozen=True)
 class _Kernel:
-    """A frozen function of Dr.Jit, and of each light how many values, times waves, it deposits."""
+    """A frozen function of Dr.Jit, how many sums and largest values it has, and of each light how many values, times
+    waves, it deposits."""
 
     launch: Any
+    counts: tuple[int, int]
     lights: list[tuple[int, int]]
 
 
@@ -186,8 +189,9 @@ def _compiled(
         # Arrays at other addresses would have a kernel of their own
         return module.Float64(aligned(np.ravel(values), np.float64))
 
-    width = len(sources[0])
-    sizes = module.UInt32(aligned(np.array([width, samples[0].shape[-1], rows]), np.uint32))
+    width, count = len(sources[0]), samples[0].shape[-1]
+    lanes = _lanes(width, count)
+    sizes = module.UInt32(aligned(np.array([width, count, rows, lanes]), np.uint32))
     # Sources of a sample lie side by side
     tables = [packets(x.data.ravel(), x.data.shape[-1], module, double=True) for x in read.tables]
     lit = [array(x) for x in sources], [array(x.T if x.ndim > 1 else x) for x in samples]
@@ -199,17 +203,17 @@ def _compiled(
                 _kernels.popitem(last=False)
         _kernels.move_to_end(kind)
         of_kind = _kernels[kind]
+        found = dr.opaque(module.Float64, 0.0, max(sum(of_kind.counts), 1) * width)
         outs = [
-            [dr.opaque(module.Float64, 0.0, (rows + 1) * width * part) for _, part in _packets(count)]
-            for count in (values * waves for values, waves in of_kind.lights)
+            [dr.opaque(module.Float64, 0.0, (rows + 1) * width * part) for _, part in _packets(values * waves)]
+            for values, waves in of_kind.lights
         ]
-        sums, largest, outs = of_kind.launch(_numbered(module.UInt32, width), *given, outs)
-        totals, greatest = (_rows([np.broadcast_to(x.numpy(), width) for x in each], width) for each in (sums, largest))
+        found, outs = of_kind.launch(_numbered(module.UInt32, lanes), *given, found, outs)
+        totals, greatest, _ = np.split(found.numpy().reshape(-1, width), np.cumsum(of_kind.counts))
         lights = []
         for (values, waves), parts in zip(of_kind.lights, outs):
-            each = [x.numpy().reshape(rows + 1, width, -1) for x in parts]
-            found = np.concatenate(each, axis=-1)[..., : values * waves]
-            lights.append(np.moveaxis(found, -1, 0).reshape(values, waves, rows + 1, width))
+            light = np.concatenate([x.numpy().reshape(rows + 1, width, -1) for x in parts], axis=-1)
+            lights.append(np.moveaxis(light[..., : values * waves], -1, 0).reshape(values, waves, rows + 1, width))
     return totals, greatest, lights
 
 
@@ -222,60 +226,72 @@ def _kernel(
     tables: Sequence[Packets],
     rows: int,
 ) -> _Kernel:
-    """The kernel of a kind: for each source a loop over the samples."""
+    """The kernel of a kind: for each source a loop over the samples, and for each lane one over its sources."""
     import drjit as dr
 
     number, integer = module.Float64, module.UInt32
     own = [x.ndim > 1 for x in samples]
+    once = _plain(function, [x[:1] for x in sources], [x[..., :1][:1] for x in samples], numbers, rows)
+    counts = len(once[0]), len(once[1])
 
     def launch(
-        source: Any,
+        lane: Any,
         of_sources: Sequence[Any],
         of_samples: Sequence[Any],
         given: Any,
         of_tables: Sequence[Any],
         sizes: Any,
+        out: Any,
         outs: Sequence[Any],
-    ) -> tuple[list[Any], list[Any], Sequence[Any]]:
-        width, count, last = (dr.gather(integer, sizes, k) for k in range(3))
+    ) -> tuple[Any, Sequence[Any]]:
+        width, count, last, lanes = (dr.gather(integer, sizes, k) for k in range(4))
         places, held = itertools.count(1), iter([replace(x, values=values) for x, values in zip(tables, of_tables)])
         read = _mapped(
             numbers,
             _Reader(lambda _: dr.gather(number, given, next(places)), module.Array3f64, lambda _: next(held)),
         )
 
-        # Read before the loop, from which LLVM takes all that depends on sources alone
-        at_source = [dr.gather(number, x, source) for x in of_sources]
+        def step(source: Any) -> tuple[Any]:
+            # Read before the loop, from which LLVM takes all that depends on sources alone
+            at_source = [dr.gather(number, x, source) for x in of_sources]
 
-        def found(k: Any) -> Found:
-            each = [dr.gather(number, x, k * width + source if of_own else k) for x, of_own in zip(of_samples, own)]
-            return function(at_source, each, read)
+            def add(k: Any, sums: list[Any], largest: list[Any]) -> tuple[Any, list[Any], list[Any]]:
+                each = [dr.gather(number, x, k * width + source if of_own else k) for x, of_own in zip(of_samples, own)]
+                more = function(at_source, each, read)
+                for light, parts in zip(more.deposits, outs):
+                    deposit(light, parts, source)
+                sums = [total + value for total, value in zip(sums, _channels(more.sums))]
+                largest = [dr.maximum(most, value) for most, value in zip(largest, _channels(more.largest))]
+                return k + 1, sums, largest
 
-        def step(k: Any, sums: list[Any], largest: list[Any]) -> tuple[Any, list[Any], list[Any]]:
-            more = found(k)
-            for light, parts in zip(more.deposits, outs):
-                values = [value * wave for value in _channels(light.values) for wave in light.waves]
-                first = module.Int64(light.first)
-                for j, share in enumerate(light.shares):
-                    row = dr.select(first < 0, last, integer(first)) if j == 0 else integer(first + j)
-                    for (begin, part), out in zip(_packets(len(values)), parts):
-                        packet = [share * value for value in values[begin : begin + part]]
-                        packet += [number(0)] * (part - len(packet))
-                        place = row * width + source
-                        add = packet[0] if part == 1 else module.ArrayXf64(packet)
-                        dr.scatter_reduce(dr.ReduceOp.Add, out, add, place, mode=dr.ReduceMode.NoConflicts)
-            sums = [total + value for total, value in zip(sums, _channels(more.sums))]
-            largest = [dr.maximum(most, value) for most, value in zip(largest, _channels(more.largest))]
-            return k + 1, sums, largest
+            start = integer(0), [number(0)] * counts[0], [number(-np.inf)] * counts[1]
+            _, sums, largest = dr.while_loop(start, lambda k, *_: k < count, add, mode="symbolic")
+            for j, value in enumerate([*sums, *largest]):
+                dr.scatter(out, value, j * width + source, mode=dr.ReduceMode.NoConflicts)
+            return (source + lanes,)
 
-        start = [number(0)] * shape[0], [number(-np.inf)] * shape[1]
-        _, sums, largest = dr.while_loop((integer(0), *start), lambda k, *_: k < count, step, mode="symbolic")
-        return sums, largest, outs
+        def deposit(light: Deposit, parts: Sequence[Any], source: Any) -> None:
+            values = [value * wave for value in _channels(light.values) for wave in light.waves]
+            first = module.Int64(light.first)
+            for j, share in enumerate(light.shares):
+                row = dr.select(first < 0, last, integer(first)) if j == 0 else integer(first + j)
+                for (begin, size), part in zip(_packets(len(values)), parts):
+                    packet = [share * value for value in values[begin : begin + size]]
+                    packet += [number(0)] * (size - len(packet))
+                    more = packet[0] if size == 1 else module.ArrayXf64(packet)
+                    dr.scatter_reduce(dr.ReduceOp.Add, part, more, row * width + source, mode=dr.ReduceMode.NoConflicts)
 
-    once = _plain(function, [x[:1] for x in sources], [x[..., :1][:1] for x in samples], numbers, rows)
-    shape = len(once[0]), len(once[1])
+        dr.while_loop((integer(lane),), lambda source: source < width, step, mode="symbolic")
+        return out, outs
+
     frozen = dr.freeze(launch, limit=SIZES, warn_after=1 << 30)
-    return _Kernel(frozen, [light.shape[:2] for light in once[2]])
+    return _Kernel(frozen, counts, [light.shape[:2] for light in once[2]])
+
+
+def _lanes(width: int, count: int) -> int:
+    """How many sources run side by side: as many as the calling thread takes at once, unless there is much to do. Other
+    threads, once Dr.Jit has woken them, keep processors busy for 20 ms more, while they look for work."""
+    return width if width * count >= SHARED else min(width, kernel.vector_width())
 
 
 def _packets(count: int) -> list[tuple[int, int]]:
