@@ -19,6 +19,7 @@ import os
 import re
 import subprocess
 import sys
+import tempfile
 import threading
 import traceback
 from collections.abc import Callable, Iterator
@@ -211,6 +212,13 @@ def llvm() -> ModuleType | None:
     import drjit.llvm
 
     return drjit.llvm
+
+
+def kept_kernels() -> Path:
+    """The folder in which Dr.Jit keeps compiled kernels, which may be missing."""
+    folder = os.environ.get("DRJIT_CACHE_DIR")
+    at_home = Path(tempfile.gettempdir(), "drjit") if sys.platform == "win32" else Path.home() / ".drjit"
+    return Path(folder) if folder else at_home
 
 
 @functools.cache

@@ -2,6 +2,7 @@
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -128,6 +129,27 @@ def test_objects_that_no_kernel_reads_run_by_numpy(monkeypatch: pytest.MonkeyPat
     monkeypatch.setattr(compiled, "_compiled", refused)
     sums, _, _ = compiled.over(function, SOURCES, SAMPLES, numbers(object()), ROWS)
     assert sums.shape == (4, 7)
+
+
+def test_kernels_that_are_kept_on_disk_are_used_at_once(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    compiled_by: list[Any] = []
+    monkeypatch.setenv("DRJIT_CACHE_DIR", str(tmp_path))
+    monkeypatch.setattr(compiled, "LEAST", 0)
+    original = compiled._compiled
+
+    def noted(*values: Any) -> Any:
+        compiled_by.append(values[1])
+        return original(*values)
+
+    monkeypatch.setattr(compiled, "_compiled", noted)
+    for many in (1 << 60, -1, 1 << 60):
+        monkeypatch.setattr(compiled, "MANY_DEPOSITED", many)
+        for memory in (compiled._mark.cache_clear, compiled._kernels.clear, compiled._asked.clear):
+            memory()
+        compiled.over(function, SOURCES, SAMPLES, numbers(), ROWS)
+    first, second = compiled_by
+    assert first == second and [*tmp_path.iterdir()] == [compiled._mark(first)]
+    compiled._mark.cache_clear()
 
 
 def test_another_number_or_address_needs_no_other_kernel(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -2,7 +2,7 @@
 
 A function is written on `velatura.ops`. NumPy begins at once; Dr.Jit takes some hundredths of a second for each kind of
 function, and then a tenth of NumPy's time: a loop over the samples, whose sums never leave the processor. So a kernel
-follows once so many values of its kind have been worked out without it.
+follows once so many values of its kind have been worked out without it, or where one is kept on disk.
 """
 
 from __future__ import annotations
@@ -10,10 +10,12 @@ from __future__ import annotations
 import contextlib
 import copy
 import functools
+import hashlib
 import itertools
 from collections import Counter, OrderedDict
 from collections.abc import Callable, Hashable, Sequence
 from dataclasses import dataclass, fields, is_dataclass, replace
+from pathlib import Path
 from threading import Lock
 from types import MethodType
 from typing import Any, NamedTuple
@@ -26,6 +28,7 @@ from velatura import kernel
 from velatura.ops import Value
 from velatura.renderer.directional_grid import Curves
 from velatura.renderer.packets import WIDTH, Packets, aligned, packets
+from velatura.version import __version__
 
 Array = NDArray[Any]
 
@@ -103,7 +106,8 @@ def over(
             read = _Read([], [])
             kind = function.__module__, function.__qualname__, kind, *(x.ndim for x in samples), _kind(numbers, read)
             _asked[kind] += width * count
-            kernels = kernel.llvm() if _asked[kind] > (MANY_DEPOSITED if rows else MANY) else None
+            many = _asked[kind] > (MANY_DEPOSITED if rows else MANY)
+            kernels = kernel.llvm() if many or _mark(kind).exists() else None
             if kernels:
                 return _compiled(kernels, kind, function, sources, samples, numbers, read, rows)
     size = max(BLOCK // count, 1)
@@ -199,6 +203,8 @@ def _compiled(
     with _launching:
         if kind not in _kernels:
             _kernels[kind] = _kernel(module, function, sources, samples, numbers, tables, rows)
+            with contextlib.suppress(OSError):
+                _mark(kind).touch()
             if len(_kernels) > KERNELS:
                 _kernels.popitem(last=False)
         _kernels.move_to_end(kind)
@@ -286,6 +292,13 @@ def _kernel(
 
     frozen = dr.freeze(launch, limit=SIZES, warn_after=1 << 30)
     return _Kernel(frozen, counts, [light.shape[:2] for light in once[2]])
+
+
+@functools.lru_cache(maxsize=256)
+def _mark(kind: Hashable) -> Path:
+    """The file, empty, that says that a kernel of a kind lies beside it, compiled by this or another process."""
+    digest = hashlib.sha256(repr((__version__, kind)).encode()).hexdigest()
+    return kernel.kept_kernels() / f"velatura-{digest[:32]}"
 
 
 def _lanes(width: int, count: int) -> int:
