@@ -31,8 +31,8 @@ def swatches(ax, title, found):
     ax.set(title=title, xticks=[], yticks=[0.75, 0.25], yticklabels=["asked", "has"])
 
 
-places = [["pane", "paint", "mixture"], ["film", "workshop", "edge"]]
-figure, axes = plt.subplot_mosaic(places, figsize=(9, 4.6), layout="constrained")
+places = [["pane", "paint", "mixture", "film"], ["workshop", "edge", "blur", "glint"]]
+figure, axes = plt.subplot_mosaic(places, figsize=(12, 4.6), layout="constrained")
 
 # %%
 # A pane and its tint and haze, and the colour of paint as it is seen through its coat.
@@ -92,3 +92,21 @@ for energy in (0.22, 0.27):
     (line,) = axes["edge"].plot(angles, np.sum(lobes.energy, axis=0)[1])
     axes["edge"].plot(75, energy, "o", color=line.get_color())
 axes["edge"].set(title="one lobe, other energies at 75°", xlabel="angle of incidence", ylabel="reflected")
+
+# %%
+# A metal below a coat whose lobe is asked to be as wide, or as bright, at 75 degrees: its blur gives way at normal
+# incidence, or its energy.
+
+start = vt.preset("coloured-absorbing-coat")
+wider = vt.inverse.answer({"start": start, "grazing": {"lobe": 2, "alpha": 0.5}}).stack
+darker = vt.inverse.answer({"start": start, "grazing": {"lobe": 2, "energy": [0.03, 0.06, 0.1]}}).stack
+for stack, style in ((start, ":"), (wider, "-")):
+    axes["blur"].plot(angles, vt.lobes(stack, np.cos(np.radians(angles))).alpha[1].mean(axis=0), style, color="C0")
+for stack, style in ((start, ":"), (darker, "-")):
+    lobe = vt.lobes(stack, np.cos(np.radians(angles))).energy[1]
+    for channel, color in zip(lobe, ("C3", "C2", "C0")):
+        axes["glint"].plot(angles, channel, style, color=color)
+axes["blur"].plot(75, 0.5, "o", color="C0")
+axes["glint"].plot([75] * 3, [0.03, 0.06, 0.1], "o", color="black")
+axes["blur"].set(title="a lobe's blur at 75°", xlabel="angle of incidence", ylabel="alpha")
+axes["glint"].set(title="and its colour", xlabel="angle of incidence", ylabel="energy")

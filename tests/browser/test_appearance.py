@@ -727,6 +727,22 @@ def test_further_wishes_are_dragged(visit: Open) -> None:
     assert np.allclose(before.energy, after.energy, atol=2e-3) and np.allclose(before.alpha, after.alpha, atol=2e-3)
     assert int(shown.input_value()) < tick
 
+    # The blur of one lobe there, then its energy: each gives way at normal incidence, and the other lobe stays
+    look.get_by_label("Light at a second angle").select_option("The lobe of interface 2")
+    for label, name in (
+        ("Blur at a second angle, slider", "alpha"),
+        ("Reflected at a second angle: share, slider", "energy"),
+    ):
+        before, shown = lobes(page), look.get_by_label(label)
+        tick = int(shown.input_value())
+        one_step(shown, (round(0.97 * tick), round(0.95 * tick)))
+        after = lobes(page)
+        assert int(shown.input_value()) < tick
+        for other in {"energy", "alpha"} - {name}:
+            assert np.allclose(getattr(before, other), getattr(after, other), atol=3e-3)
+        assert np.allclose(getattr(before, name)[0], getattr(after, name)[0], atol=2e-3)
+        assert np.all(getattr(after, name)[1] < 0.99 * getattr(before, name)[1])
+
     # A mixture, by its weights, taken up again before the step ends; its parts are wished for one at a time
     look = further("Half-metallic paint")
     page.settled()

@@ -837,6 +837,10 @@ def test_a_material_states_what_it_lacks_for_a_wish() -> None:
     found = {each["key"]: each for each in VERBS["wishes"]({"material": pane, "model": "bati2021"})["wishes"]}
     assert set(found) == {"grazing", "passed", "body", "film"}
     assert found["passed"]["haze"] > 0 and found["passed"]["way"] == "a tinted medium below layer 0"
+    tilted = vt.lobes(Stack.from_dict(pane), np.cos(np.radians(75)), model="bati2021")
+    for lobe, energy, alpha in zip(found["grazing"]["lobes"], tilted.energy, tilted.alpha):
+        assert lobe["energy"] == pytest.approx(energy[:, 0].tolist())
+        assert lobe["alpha"] == pytest.approx(alpha.mean())
     for key in ("passed", "body", "film"):
         other = VERBS["wishes"]({"material": found[key]["material"], "model": "bati2021"})["wishes"]
         assert not [each for each in other if each["key"] == key and "lacks" in each]

@@ -149,6 +149,22 @@ def test_a_wish_at_grazing_keeps_the_lobes_of_the_present_material() -> None:
     assert np.allclose(before.alpha, after.alpha, atol=2e-3)
 
 
+@pytest.mark.parametrize("model", ["velatura", "bati2021"])
+@pytest.mark.parametrize(("lobe", "key"), [(1, "energy"), (1, "alpha"), (2, "energy"), (2, "alpha")])
+def test_a_lobe_at_grazing_gives_way_at_normal_incidence_in_what_is_asked(lobe: int, key: str, model: str) -> None:
+    """Expected: the lobe has what is asked for at 70 degrees; at normal incidence the other lobe and the rest stay."""
+    before = vt.lobes(COATED, np.cos(np.radians([0, 70])), model=model)
+    energy, alpha = before.energy[lobe - 1][:, 1], before.alpha[lobe - 1][:, 1]
+    asked = {"energy": tuple((0.9 * energy).tolist()), "alpha": 0.9 * float(alpha.mean())}[key]
+    found = answer({"start": COATED, "grazing": {"lobe": lobe, key: asked, "angle": 70}}, model)
+    after = vt.lobes(found.stack, np.cos(np.radians([0, 70])), model=model)
+    own = {"energy": after.energy[lobe - 1][:, 1], "alpha": after.alpha[lobe - 1][:, 1].mean()}[key]
+    assert own == pytest.approx(asked, abs=1e-3)
+    kept = [(n, each) for n in (0, 1) for each in ("energy", "alpha") if (n, each) != (lobe - 1, key)]
+    for n, each in kept:
+        assert getattr(after, each)[n][:, 0] == pytest.approx(getattr(before, each)[n][:, 0], abs=2e-3)
+
+
 @pytest.mark.parametrize(
     ("wish", "why"),
     [
@@ -160,6 +176,10 @@ def test_a_wish_at_grazing_keeps_the_lobes_of_the_present_material() -> None:
         (
             {"start": COATED, "grazing": {"energy": 0.9}},
             "no stack of these layers with its lobes is found that has graz",
+        ),
+        (
+            {"start": COATED, "grazing": {"energy": 0.9, "lobe": 1}},
+            "no stack of these layers with the rest of its lobes is found that has graz",
         ),
     ],
 )

@@ -10,14 +10,14 @@ import numpy as np
 from velatura.editor.messages import Answer, Body, Verb, document, field, material_of, model_of
 from velatura.inverse import Infeasible, Target
 from velatura.inverse.answer import nearest_answers, refused
-from velatura.inverse.wishes import KINDS, MixtureColour
+from velatura.inverse.wishes import KINDS, Grazing, MixtureColour
 from velatura.model import Model
 from velatura.model.registry import stack_lobes
 from velatura.stack import Described, Mix
 
 ANGLE = 75.0  # of the second look
 CHOICES = 4  # of what a workshop has
-TILTED, BLURRED = "grazing", "passed"  # seen at that angle, and with a blur that needs no absorption
+BLURRED = "passed"  # with a blur that needs no absorption
 
 
 def wishes(body: Body) -> Answer:
@@ -37,11 +37,18 @@ def _shown(stack: Described, model: Model, angle: float) -> list[Answer]:
         if lacking and lacking.stack:
             row |= {"lacks": lacking.why, "way": lacking.words, "material": document(lacking.stack)}
         if lacking is None or (key == BLURRED and stack.transmits):
-            has: dict[str, Any] = wish.shown(seen, int(key == TILTED), groups)
-            row |= {**has, "energy": np.broadcast_to(has["energy"], 3).tolist()}
+            row |= _coloured(wish.shown(seen, int(kind is Grazing), groups))
+        if kind is Grazing:
+            each = (Grazing(energy=0.5, lobe=k + 1) for k in range(len(groups)))
+            row["lobes"] = [_coloured(one.shown(seen, 1, groups)) for one in each]
         if len(row) > 1:
             found.append(row)
     return found
+
+
+def _coloured(shown: dict[str, Any]) -> dict[str, Any]:
+    """What is shown, its energy in three channels."""
+    return {**shown, "energy": np.broadcast_to(shown["energy"], 3).tolist()}
 
 
 def wish(body: Body) -> Answer:

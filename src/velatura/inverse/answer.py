@@ -1,17 +1,17 @@
 """The answer to a wish of any kind: the stack that is asked for, or the nearest one.
 
 Lobes come first: those that are asked for, and where the appearance at a second angle is, those of the present
-material. Of the stacks that have them the answer is the nearest to all other wishes, by the CIE 1976 difference of
-colours and by roughness. Values that no wish is about stay as they are.
+material, of which a lobe that is asked for there gives way in what is asked. Of the stacks that have them the answer is
+the nearest to all other wishes, by the CIE 1976 difference of colours and by roughness. Values that no wish is about
+stay as they are.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import pairwise
-from typing import Any
+from typing import Any, TypeAlias
 
 import numpy as np
 
@@ -44,6 +44,9 @@ MISSED = 5e-3  # of what is missed that is worth a word: half a unit of CIE 1976
 DRAWN, TRIED = 40, 3  # stacks with the lobes that are looked at, and that searches begin with
 INDEX, ABSORPTION = {"eta", "k"}, {"sigma", "depth"}  # keys that stay where substances are given, or optical depths
 SAME = 1e-3  # relative difference of values that are one answer
+
+#: What may change of lobes at normal incidence: the place of each, and "energy" or "alpha".
+Loose: TypeAlias = frozenset[tuple[int, str]]
 
 
 @dataclass(frozen=True)
@@ -142,12 +145,12 @@ def nearest_answers(wanted: Target, count: int, model: Model, seed: int = 0, qui
             raise Infeasible(lacking.why, 0, wish.key, [Direction("layer", lacking.words, 0.0, other)])
     for wish in wanted.further:
         starts = [other for stack in starts for other in wish.starts(stack)]
-    held = _held(wanted, starts[0], model)
+    held, loose = _held(wanted, starts[0], model), _loose(wanted)
     wanted = held if wanted.available else wanted
-    tried = _made_of(held, starts, model) or starts
-    tried.sort(key=lambda stack: _Search.of(held, stack, model.surrogate).cost)
+    tried = _made_of(held, starts, model, loose) or starts
+    tried.sort(key=lambda stack: _Search.of(held, stack, model.surrogate, loose).cost)
     effort, found = QUICK if quick else THOROUGH, list[Answer]()
-    searches = [_Search.of(held, start, model) for start in tried[: max(TRIED, 2 * count)]]
+    searches = [_Search.of(held, start, model, loose) for start in tried[: max(TRIED, 2 * count)]]
     for search in searches:
         each = search.answer(search.straight(effort), wanted)
         if not any(_alike(each.stack, other.stack) for other in found):
@@ -192,14 +195,14 @@ def _pinned(stack: Stack, wanted: Target) -> Stack:
     return stack.replace(**pins) if pins else stack
 
 
-def _made_of(wanted: Target, starts: list[Stack], model: Model) -> list[Stack]:
+def _made_of(wanted: Target, starts: list[Stack], model: Model, loose: Loose) -> list[Stack]:
     """Stacks of substances that are available, whose other values come near to the wish; none where all are."""
     if not wanted.available:
         return []
     kept = [n for n, keys in _fixed(wanted, starts[0]).items() if keys & (INDEX | ABSORPTION)]
     found = []
     for stack in made_of(starts, wanted.available, kept, wanted.thinnest):
-        search = _Search.of(wanted, stack, model.surrogate)
+        search = _Search.of(wanted, stack, model.surrogate, loose)
         found.append(search.values.placed(search.straight(QUICK))[0])
     return found
 
@@ -235,12 +238,22 @@ def _held(wanted: Target, stack: Stack, model: Model) -> Target:
     return wanted.model_copy(update={"lobes": tuple(lobes)})
 
 
+def _loose(wanted: Target) -> Loose:
+    """What is asked of a lobe of the present material at a second angle, by the place of the lobe: at normal incidence
+    that does not stay."""
+    if wanted.lobes:
+        return frozenset()
+    each = ((wish.lobe, key) for wish in wanted.grazing for key in wish.asked_for if getattr(wish, key) is not None)
+    return frozenset((lobe - 1, key) for lobe, key in each if lobe is not None)
+
+
 def refused(found: Answer) -> Infeasible:
     """The refusal of a wish, with the nearest stack as its way out."""
     pairs = zip(found.target.further, found.reached.further)
     off = [(float(np.abs(wish.goal - has.goal).max()), wish, has) for wish, has in pairs]
     _, wish, has = max(off, key=lambda each: each[0])
     lobes = " with its lobes" if found.target.lobes or wish.keeps_lobes else ""
+    lobes = " with the rest of its lobes" if _loose(found.target) else lobes
     way = Direction(wish.key, has.words(), found.missed, found.reached.model_copy(update={"start": found.stack}))
     nothing = (
         "no weights of these parts give"
@@ -269,11 +282,12 @@ class _Seen:
     wish: Target
     lobes: StackLobes
     model: Model
+    loose: Loose = frozenset()
 
     @classmethod
-    def of(cls, wish: Target, stack: Stack, model: Model) -> _Seen:
+    def of(cls, wish: Target, stack: Stack, model: Model, loose: Loose = frozenset()) -> _Seen:
         angles = [0.0, *(each.angle for each in wish.further)]
-        return cls(wish, stack_lobes(stack, np.cos(np.radians(angles)), model=model), model)
+        return cls(wish, stack_lobes(stack, np.cos(np.radians(angles)), model=model), model, loose)
 
     @property
     def groups(self) -> list[list[int]]:
@@ -298,16 +312,17 @@ class _Seen:
     @property
     def missed(self) -> Array:
         """Differences from the lobes, and from further wishes, in the units of `Answer.missed`."""
-        rows = [self._lobe_missed(lobe, own) for lobe, own in zip(self.wish.lobes, self.groups)]
-        rows = [FIRST * row for row in rows]
+        rows = [FIRST * self._lobe_missed(k) for k in range(len(self.wish.lobes))]
         rows += [has.goal - wish.goal for wish, has in zip(self.wish.further, self.reached.further)]
         return np.concatenate(rows)
 
-    def _lobe_missed(self, lobe: TargetLobe, own: Sequence[int]) -> Array:
+    def _lobe_missed(self, k: int) -> Array:
+        lobe, own = self.wish.lobes[k], self.groups[k]
         energy = np.sum([self.lobes.energy[n][:, 0] for n in own], axis=0)
         goal = np.array(Covariance.of(lobe.axes, MAPS[self.model.map]).matrix())
         blurs = [WIDTHS * (self.lobes.covariance[n][:, 0] - goal) / (goal.max() + BLURRED) for n in own]
-        return np.concatenate([compared(energy, None) - compared(lobe.colour, None), *blurs])
+        energies = [] if (k, "energy") in self.loose else [compared(energy, None) - compared(lobe.colour, None)]
+        return np.concatenate([*energies, *([] if (k, "alpha") in self.loose else blurs), []])
 
 
 @dataclass(frozen=True)
@@ -317,9 +332,10 @@ class _Search:
     wish: Target
     values: FreeValues
     model: Model
+    loose: Loose
 
     @classmethod
-    def of(cls, wish: Target, stack: Stack, model: Model) -> _Search:
+    def of(cls, wish: Target, stack: Stack, model: Model, loose: Loose) -> _Search:
         fixed = _fixed(wish, stack)
 
         def allowed(free: Free) -> Free | None:
@@ -336,7 +352,7 @@ class _Search:
         values = FreeValues(
             start=stack, eta_max=wish.eta_max, allowed=allowed, laid=frozenset(coats), thinnest=wish.thinnest
         )
-        return cls(wish, values, model)
+        return cls(wish, values, model, loose)
 
     @cached_property
     def missed(self) -> Array:
@@ -399,7 +415,7 @@ class _Search:
 
     def _read(self, x: Array) -> Array:
         try:
-            return _Seen.of(self.wish, self.values.placed(x)[0], self.model).missed
+            return _Seen.of(self.wish, self.values.placed(x)[0], self.model, self.loose).missed
         except InvalidInput:  # a rough interface with films between equal indices
             return np.full(len(self.missed), 1e3)
 

@@ -5,7 +5,7 @@ import { setAppearance } from '../../state/commands.js';
 import { documentOf, stackOf } from '../../state/material.js';
 import { setWeights } from '../../state/parts.js';
 import { colourRow } from '../colour.js';
-import { capital, number } from '../controls.js';
+import { capital, menu, number } from '../controls.js';
 import { mean } from '../plots/scale.js';
 import { line } from '../settings.js';
 import { withMean } from './looks.js';
@@ -31,10 +31,11 @@ const rounded = (value) => Number(value.toPrecision(4));
  * @param {{question: function, ask: function, paint: function}} panel what the panel around knows and does
  */
 export function createWishes({ store, call, edits, messages }, panel) {
-  let read = []; // what the stack shows of each wish: {key, energy, haze}, or lacks for it: {lacks, way, material}
+  let read = []; // what the stack shows of each wish: {key, energy, haze, lobes}, or lacks for it: {lacks, way, material}
   let mixed = []; // the same of the mixture that it is a part of
   let text = ''; // what was asked about
   let angle = 75;
+  let tilted = 0; // the lobe that is seen at that angle, by its interface from 1; 0 for all that is reflected
   let origin = null; // material that the wishes of a step start from
   let asked = null; // {key, wish}, where it could not be had, or not yet
   let refused = null; // why it could not
@@ -52,6 +53,7 @@ export function createWishes({ store, call, edits, messages }, panel) {
     const found = await shownBy(stackOf(store.get()));
     if (!found || own !== text) return;
     [read, mixed] = [found, []];
+    if (!read.find(({ lobes }) => lobes)?.lobes[tilted - 1]) tilted = 0;
     panel.paint();
     if (store.get().parts) await readMixture();
   }
@@ -119,11 +121,11 @@ export function createWishes({ store, call, edits, messages }, panel) {
     panel.paint();
   }
 
-  /** Requests changes of a wish; those that the same drag has asked for remain. */
+  /** Requests changes of a wish; those that the same step has asked for remain. */
   function want(key, changes) {
     if (asked?.key !== key) origin = null;
+    const before = origin ? asked.wish : key === 'grazing' ? { angle, ...(tilted && { lobe: tilted }) } : {};
     origin ??= (key === MIXTURE ? documentOf : stackOf)(store.get());
-    const before = asked?.key === key ? asked.wish : key === 'grazing' ? { angle } : {};
     asked = { key, wish: { ...before, ...changes } };
     held = true;
     wishes.want(asked);
@@ -147,22 +149,29 @@ export function createWishes({ store, call, edits, messages }, panel) {
     refuse,
   });
 
-  /** A wish as it is asked for while its step goes on, so that hues do not drift by its answers; else as the material has it. */
-  const underHand = (shown) => (origin && asked?.key === shown.key ? { ...shown, ...asked.wish } : shown);
+  /** A wish as it is asked for while its step goes on, so that hues do not drift by its answers; else as the material, or
+   * the chosen lobe of it, has it. */
+  const underHand = (shown) => ({
+    ...shown,
+    ...(tilted && shown.lobes?.[tilted - 1]),
+    ...(origin && asked?.key === shown.key && asked.wish),
+  });
 
   function row(shown) {
-    const { key, energy, haze } = underHand(shown);
+    const { key, energy, haze, alpha } = underHand(shown);
     const title = TITLES[key];
     const toMean = (value) => ({ energy: withMean(energy, Math.max(value, DARKEST)).map(rounded) });
     const toHaze = (value) => ({ haze: rounded(value) });
+    const toBlur = (value) => ({ alpha: rounded(value) });
+    const blur = () => number({ label: 'Blur at a second angle', value: rounded(alpha), spec: SHARE, edit: edit(key, toBlur) });
     const tint = () => [
       line('Colour', colourRow({ label: title, value: energy, spec: SHARE, edit: edit(key, (value) => ({ energy: value })) })),
       line('Energy', number({ label: `${title}: share`, value: rounded(mean(energy)), spec: SHARE, edit: edit(key, toMean) })),
     ];
     return html`<fieldset>
       <legend>${title}</legend>
-      ${key === 'grazing' ? line('Angle', number({ label: 'Second angle', value: angle, spec: STEEPEST, edit: ofAngle })) : nothing}
-      ${shown.lacks ? lacking(shown) : tint()}
+      ${key === 'grazing' ? seen(shown.lobes) : nothing} ${shown.lacks ? lacking(shown) : tint()}
+      ${key === 'grazing' && tilted ? line('Blur', blur()) : nothing}
       ${haze === undefined ? nothing : line('Haze', number({ label: 'Haze', value: rounded(haze), spec: HAZE, edit: edit(key, toHaze) }))}
       ${refused && asked?.key === key ? html`<p class="refused">${capital(refused)}.</p>` : nothing}
     </fieldset>`;
@@ -173,6 +182,18 @@ export function createWishes({ store, call, edits, messages }, panel) {
     follow();
   };
   const ofAngle = { move: turn, set: turn, settle() {}, refuse };
+
+  /** At which angle light is seen, and of which lobe. */
+  const seen = (lobes) => [
+    line('Angle', number({ label: 'Second angle', value: angle, spec: STEEPEST, edit: ofAngle })),
+    line('Light of', menu({ label: 'Light at a second angle', value: String(tilted), options: whose(lobes), choose: look })),
+  ];
+  const whose = (lobes) => [['0', 'All'], ...lobes.map((_, k) => [String(k + 1), `The lobe of interface ${k + 1}`])];
+
+  function look(lobe) {
+    [tilted, asked, refused, origin] = [Number(lobe), null, null, null];
+    panel.paint();
+  }
 
   const lacking = ({ lacks, way, material }) => html`<p class="faint">
     ${capital(lacks)}.
