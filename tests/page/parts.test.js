@@ -5,6 +5,7 @@ import { test } from 'node:test';
 
 import { initial, setValue } from '../../src/velatura/editor/page/state/commands.js';
 import { documentOf, flat, pattern, stackOf } from '../../src/velatura/editor/page/state/material.js';
+import { coveringOf } from '../../src/velatura/editor/page/render/slot.js';
 import * as parts from '../../src/velatura/editor/page/state/parts.js';
 
 const SESSION = {
@@ -118,4 +119,34 @@ test('materials of another exterior, and too many, are not mixed', () => {
   assert.match(parts.objectionToMixing(state, { ...stack('pebble', 1.5), exterior: 1.33 }), /^The exterior of all parts is one: here 1, in pebble 1.33/);
   const many = { mix: [...Array(15)].map((_, k) => ({ ...(k < 14 && { weight: 0.01 }), material: stack('', 1.5) })) };
   assert.match(parts.objectionToMixing(state, many), /16 stacks at most, and this would be 17/);
+});
+
+test('a part of an object gets a material, another one, and goes back to the rest', () => {
+  const covers = (state) => documentOf(state).mix.map(({ covers: name, weight, material }) => [name, weight, material.name]);
+  const once = parts.cover(opened(stack('paint', 1.5)), 'Foot', stack('steel', 2.5));
+  assert.deepEqual(covers(once), [['Foot', 0.5, 'steel'], [undefined, undefined, 'paint']]);
+  assert.equal(once.layers[0].keys.eta, 2.5);
+  const twice = parts.cover(once, 'Bulb', PAIR);
+  assert.deepEqual(covers(twice), [['Foot', 0.5, 'steel'], ['Bulb', 0.25, 'Worn'], [undefined, undefined, 'paint']]);
+  assert.deepEqual(covers(parts.cover(twice, 'Foot', stack('rust', 1.7)))[0], ['Foot', 0.5, 'rust']);
+  assert.equal(parts.coveringName(twice, 'Bulb'), 'Worn');
+  assert.equal(parts.coveringName(twice, 'Base'), 'as the rest');
+  assert.equal(parts.chooseCovering(twice, 'Base').layers[0].keys.eta, 1.5);
+  const moved = parts.setCovers(twice, idOf(twice, 'Worn'), 'Foot');
+  assert.deepEqual(covers(moved).map(([name]) => name), [undefined, 'Foot', undefined]);
+  assert.deepEqual(documentOf(parts.removePart(once, idOf(once, 'steel'))).layers, stack('', 1.5).layers);
+});
+
+test('a mixture becomes the rest as a whole, and one that covers is written as it was read', () => {
+  const worn = parts.cover(opened(PAIR), 'Foot', stack('steel', 2.5));
+  assert.deepEqual(documentOf(worn).mix[1].material.mix, PAIR.mix);
+  const material = { mix: [{ weight: 0.5, material: stack('steel', 2.5), covers: 'Foot' }, { material: PAIR, covers: 'Shade' }] };
+  assert.deepEqual(documentOf(opened(material)), material);
+});
+
+test('the stacks of what covers a part are numbered for the picture; where shares hold by 0', () => {
+  const found = (names, covers) => [...coveringOf(names, covers)].slice(0, 3);
+  assert.deepEqual(found(['Shade', 'Foot', 'Bulb'], ['Foot', 'Shade', '']), [2, 1, 3]);
+  assert.deepEqual(found([''], ['Foot', '']), [0, 0, 0]);
+  assert.deepEqual(found(['Foot'], null), [0, 0, 0]);
 });

@@ -19,12 +19,12 @@ from velatura.scenes.environments import studio
 BODY = {**MIRROR, "samples": 40, "file": "ball.exr"}
 
 
-def sent(**arrays: Any) -> dict[str, str]:
+def sent(**arrays: Any) -> dict[str, Any]:
     """Arrays of a mesh as the page sends them."""
     return {key: base64.b64encode(bytes(array)).decode() for key, array in arrays.items()}
 
 
-def triangle(**others: Any) -> dict[str, str]:
+def triangle(**others: Any) -> dict[str, Any]:
     corners = np.zeros(9, "<f4")
     return sent(
         **{
@@ -35,6 +35,10 @@ def triangle(**others: Any) -> dict[str, str]:
             **others,
         }
     )
+
+
+def part(name: str, triangles: int = 1) -> dict[str, Any]:
+    return {"name": name, "triangles": triangles}
 
 
 def lit(picture: np.ndarray, **others: int) -> dict[str, Any]:
@@ -95,6 +99,24 @@ def test_a_mesh_takes_the_place_of_an_object(renderings: rendering.Renderings) -
     assert given == pytest.approx(named, abs=1e-3)
 
 
+def test_parts_of_a_mesh_have_what_covers_them(renderings: rendering.Renderings) -> None:
+    """Expected: each half of a sphere is as on a sphere of its material alone, but for light from the other half."""
+    surface = scenes.OBJECTS["sphere"].surface()
+    left = surface.positions[surface.triangles[:, 0], 0] < 0
+    triangles = np.concatenate([surface.triangles[left], surface.triangles[~left]])
+    arrays = (x.astype("<f4") for x in (surface.positions, surface.normals, surface.uv))
+    mesh = sent(**dict(zip(("positions", "normals", "uv"), arrays)), triangles=triangles.astype("<u4"))
+    parts = [part("left", int(left.sum())), part("right", int((~left).sum()))]
+    smooth, rough = ({"layers": [{"interface": {"conductor": "Au", "alpha": alpha}}]} for alpha in (0.1, 0.5))
+    mix = {"mix": [{"weight": 0, "material": smooth, "covers": "left"}, {"material": rough}]}
+    both, _ = made(renderings, mesh={**mesh, "parts": parts}, material=mix, samples=64)
+    for key, material, half in (("two", smooth, np.s_[5:10, 9:12]), ("three", rough, np.s_[5:10, 13:16])):
+        alone, _ = made(renderings, material=material, samples=64, key=key)
+        other = both[:, ::-1][half]
+        assert both[half].mean(axis=(0, 1)) == pytest.approx(alone[half].mean(axis=(0, 1)), rel=0.1)
+        assert np.abs(other - alone[half]).mean() > 2 * np.abs(both[half] - alone[half]).mean()
+
+
 def test_a_picture_of_light_takes_the_place_of_the_environments(renderings: rendering.Renderings) -> None:
     """Expected: that of the studio gives its picture, turned as it is."""
     named, _ = made(renderings, samples=4, rotation=50)
@@ -128,6 +150,17 @@ def test_a_step_that_was_made_is_not_made_again_and_another_picture_ends_it(rend
             {"mesh": triangle(triangles=np.array([0, 1, 3], "<u4"))},
             "mesh: triangles: must be of vertices below 3, got 3",
         ),
+        ({"mesh": {**triangle(), "parts": []}}, "mesh: parts: must be a list of 1 to 32"),
+        ({"mesh": {**triangle(), "parts": [{"name": 1}]}}, "mesh: parts: name: must be text of 255 characters at most"),
+        (
+            {"mesh": {**triangle(), "parts": [part("a", 2)]}},
+            "mesh: parts: triangles: must be a whole number from 1 to 1",
+        ),
+        (
+            {"mesh": {**triangle(), "parts": [part("a"), part("b")]}},
+            "mesh: parts: must have 1 triangles together, got 2",
+        ),
+        ({"mesh": {**triangle(), "parts": [part("a"), part("a")]}}, "mesh: parts: name: .* once, got 'a'"),
         ({"light": {"width": 1, "height": 2}}, "light: width and height must be whole numbers from 2 to 2048"),
         ({"light": lit(np.zeros((2, 4, 3)), width=3)}, "light: data: must be of 6 texels, got 8"),
         ({"light": lit(np.full((2, 4, 3), -1.0))}, "light: data: must be from 0 to 1e"),

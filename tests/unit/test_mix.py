@@ -268,3 +268,18 @@ def test_lobes_on_the_command_line_are_named_by_their_parts(tmp_path: Path, caps
     found = json.loads(capsys.readouterr().out)
     assert found["transmitted"] == [] and len(found["reflected"]) == 2
     assert np.allclose(np.array(found["reflected"][1]["energy"]).T, 0.8 * vt.lobes(METAL, 1.0).energy[0])
+
+
+def test_a_part_that_covers_one_of_an_object_is_kept_and_found() -> None:
+    """Expected: by its name; other names have the last part, and without a name, or a part that covers, shares hold."""
+    plain = vt.Mix([(0.25, GOLD), (None, PAINT)])
+    mix = vt.Mix.from_dict(
+        {"mix": [{"weight": 0.25, "material": GOLD, "covers": "Foot"}, {"material": PAINT, "covers": "Shade"}]}
+    )
+    again = vt.Mix.from_dict(mix.to_dict()).replace(part0_weight=0.5, part0_layer0_alpha=0.3)
+    assert [part.covers for part in again.mix] == ["Foot", "Shade"]
+    foot, shade = (part.material for part in again.mix)
+    assert [again.covering(name) for name in ("Foot", "Shade", "Bulb", "")] == [foot, shade, shade, again]
+    assert plain.covering("Foot") is plain
+    with pytest.raises(vt.InvalidInput, match="part 0: covers: must be text"):
+        vt.Mix.from_dict({"mix": [{"weight": 0.25, "material": GOLD, "covers": 3}, {"material": PAINT}]})

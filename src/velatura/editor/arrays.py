@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import base64
 import binascii
+from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any, ClassVar
 
@@ -12,8 +13,10 @@ from numpy.typing import NDArray
 
 from velatura.scenes.environments import BRIGHTEST
 from velatura.scenes.surfaces import Mesh
-from velatura.stack.schema import Parameter
+from velatura.stack.schema import Parameter, show
 
+PARTS = 32  # of an object
+NAME = 255  # characters
 MOST = 500_000  # triangles, as many as the page draws
 WIDEST = 2048  # texels of a picture, along either side, as the page has them
 FARTHEST = 1e4  # of a position from the origin
@@ -22,11 +25,15 @@ ARRAYS = {"positions": ("<f4", 3), "normals": ("<f4", 3), "uv": ("<f4", 2), "tri
 
 @dataclass(frozen=True)
 class Triangles(Parameter):
-    """A mesh: the bytes of each of ARRAYS in base64, numbers little-endian, those of a vertex side by side."""
+    """A mesh: the bytes of each of ARRAYS in base64, numbers little-endian, those of a vertex side by side.
+
+    Its `parts` are the name and the number of triangles of each, in their order; the mesh is checked as one surface a
+    part, by names.
+    """
 
     what: ClassVar[str] = "an object of positions, normals, uv and triangles"
 
-    def check(self, value: Any) -> Mesh:
+    def check(self, value: Any) -> dict[str, Mesh]:
         if not isinstance(value, dict):
             raise self.refuse(value)
         positions, normals, uv, triangles = (_array(value, key, *ARRAYS[key]) for key in ARRAYS)
@@ -40,7 +47,36 @@ class Triangles(Parameter):
             raise ValueError(f"numbers must be finite and at most {FARTHEST:g} in size")
         lengths = np.linalg.norm(normals, axis=1, keepdims=True)
         upwards = np.where(lengths > 0, normals / np.maximum(lengths, 1e-30), (0.0, 1.0, 0.0))
-        return Mesh(positions.astype(float), upwards, uv.astype(float), triangles)
+        whole = Mesh(positions.astype(float), upwards, uv.astype(float), triangles)
+        parts = value.get("parts")
+        return {"": whole} if parts is None else dict(_divided(whole, _parts(parts, len(triangles))))
+
+
+def _parts(value: Any, triangles: int) -> dict[str, int]:
+    """The numbers of triangles of parts, by their names. Raises ValueError."""
+    if not isinstance(value, list) or not 1 <= len(value) <= PARTS:
+        raise ValueError(f"parts: must be a list of 1 to {PARTS}")
+    counts: dict[str, int] = {}
+    for part in value:
+        name, count = (part.get("name"), part.get("triangles")) if isinstance(part, dict) else (None, None)
+        if not isinstance(name, str) or len(name) > NAME or name in counts:
+            raise ValueError(f"parts: name: must be text of {NAME} characters at most, once, got {show(name)}")
+        if not isinstance(count, int) or not 1 <= count <= triangles:
+            raise ValueError(f"parts: triangles: must be a whole number from 1 to {triangles}, got {show(count)}")
+        counts[name] = count
+    if sum(counts.values()) != triangles:
+        raise ValueError(f"parts: must have {triangles} triangles together, got {sum(counts.values())}")
+    return counts
+
+
+def _divided(mesh: Mesh, counts: dict[str, int]) -> Iterator[tuple[str, Mesh]]:
+    """The parts of a mesh, each with its own vertices alone."""
+    first = 0
+    for name, count in counts.items():
+        used, corners = np.unique(mesh.triangles[first : first + count], return_inverse=True)
+        places = (mesh.positions[used], mesh.normals[used], mesh.uv[used])
+        yield name, Mesh(*places, corners.reshape(-1, 3).astype(np.uint32))
+        first += count
 
 
 @dataclass(frozen=True)

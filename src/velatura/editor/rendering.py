@@ -152,12 +152,10 @@ class Picture:
         from velatura.api import bsdf
 
         mi = kernel.mitsuba()
-        made = (
-            bsdf(self.material, "reference", microsurface=self.model.microsurface)
-            if self.kind.walk
-            else bsdf(self.material, self.model)
+        walk = functools.partial(bsdf, model="reference", microsurface=self.model.microsurface)
+        scene = self.shot.scene(
+            self.material, walk if self.kind.walk else lambda part: bsdf(part, self.model), self.size
         )
-        scene = self.shot.scene(made, self.size)
         film = scene["sensor"]["film"]
         if self.kind.transparent:
             scene = {name: part for name, part in scene.items() if name not in HIDDEN}

@@ -36,7 +36,7 @@ def _rendered(
     from velatura.api import bsdf
 
     mi = kernel.mitsuba()
-    scene = shot.scene(bsdf(material, "reference", microsurface=microsurface), size)
+    scene = shot.scene(material, lambda part: bsdf(part, "reference", microsurface=microsurface), size)
     return np.array(mi.render(mi.load_dict(scene), spp=spp, seed=seed))[..., :3]
 
 

@@ -50,14 +50,18 @@ class MaterialRecord(Parameter):
 
 
 class Part(Record):
-    """A part of a mixture: its share of the surface, None for what the others leave, and its material."""
+    """A part of a mixture: its share of the surface, None for what the others leave, and its material.
 
-    holds = "weight and material"
+    On an object with a part of the name `covers`, it has the whole of that part (`Mix.covering`).
+    """
+
+    holds = "weight, material and covers"
 
     weight: Annotated[Taken[ScalarLike | None, float | Texture | None], WEIGHT] = by_default(None)
     material: Annotated[
         Taken[Stack | Mix | str | Path | Written, Stack | Mix], MaterialRecord("what covers this share")
     ]
+    covers: Annotated[str, Text("part of an object, by name, that it has the whole of")] = ""
 
 
 class Parts(Parameter):
@@ -148,6 +152,14 @@ class Mix(Record):
         """
         weights = {at.name: at.plain(value, refusal) for at, value in self.values() if at.declared is WEIGHT}
         return [(share, stack) for share, (_, stack) in zip(self.shares(weights), self.leaves())]
+
+    def covering(self, name: str) -> Stack | Mix:
+        """The material of a part of an object, by its name: that of the part that covers it, else of the last; the
+        mixture where no part covers any, or for no name."""
+        if not name or not any(part.covers for part in self.mix):
+            return self
+        found = [part for part in self.mix if part.covers == name]
+        return (found or self.mix[-1:])[0].material
 
     def each(self, change: Callable[[tuple[int, ...], Stack], Stack]) -> Mix:
         """The mixture with every stack changed, by the numbers of the parts that it is in."""
@@ -294,7 +306,8 @@ def _changed(part: Part, change: dict[str, Any], last: bool) -> Part:
         raise InvalidInput("weight: is what the other parts leave; change theirs")
     material = part.material.replace(**change) if change else part.material
     weight = part.weight if weight is None else weight
-    return Part(material=material) if weight is None else Part(weight=weight, material=material)
+    own = {} if weight is None else {"weight": weight}
+    return Part(**own, material=material, covers=part.covers)
 
 
 def _with_rest(parts: Sequence[Part]) -> tuple[Part, ...]:
@@ -313,7 +326,7 @@ def _with_rest(parts: Sequence[Part]) -> tuple[Part, ...]:
         raise ValueError(f"{last}: must be left out beside textures, since it is what these leave")
     if total < 1 - ROUNDING:
         raise ValueError(f"weights must sum to 1, got {total:g}; or leave out the last one")
-    return (*parts[:-1], Part(material=parts[-1].material))
+    return (*parts[:-1], parts[-1].model_copy(update={"weight": None}))
 
 
 _depth: ContextVar[int] = ContextVar("depth", default=0)

@@ -77,6 +77,10 @@ class Stack(Record):
         """The stack changed, as `Mix.each` changes all stacks."""
         return change((), self)
 
+    def covering(self, name: str) -> Stack:
+        """The stack, which covers all parts of an object, as `Mix.covering`."""
+        return self
+
     def shares(self, weights: Mapping[str, Any]) -> list[Any]:
         """The share of the stack in itself, as `Mix.shares`."""
         return [1.0]

@@ -10,6 +10,7 @@ import * as commands from './state/commands.js';
 import { createEdits } from './state/edits.js';
 import { chosenOf, enabled, leavesOf } from './state/material.js';
 import { createMessages } from './state/messages.js';
+import { chooseCovering, coveringName } from './state/parts.js';
 import { follow } from './state/picture.js';
 import { createSnapshots } from './state/snapshots.js';
 import { createStore } from './state/store.js';
@@ -79,6 +80,7 @@ export function mount(root, { call, lacks = nothingLacks, live, session, storage
   const picture = follow({
     ...{ store, viewport, call, lacks, session, files },
     onShader: update,
+    onObject: update,
     onProblem(about, error) {
       if (!error) return messages.forgive(about);
       const number = layerNamed(error.message, store.get());
@@ -90,7 +92,7 @@ export function mount(root, { call, lacks = nothingLacks, live, session, storage
   });
   const ahead = lookAhead({ store, viewport, call, lacks, session, drawn: () => picture.drawn('a') });
   const truth = followTruth({
-    ...{ store, viewport, call },
+    ...{ store, viewport, call, files },
     onProblem: (error) =>
       error ? messages.complain('truth', `The truth: ${error.message}`) : messages.forgive('truth'),
   });
@@ -117,7 +119,7 @@ export function mount(root, { call, lacks = nothingLacks, live, session, storage
     ...{ store, session, ...arrangement, edits, messages, picture, canvas, focus, update, lacks, toolbar: toolbar.view },
     choice: choice.view,
     layers: createLayers({
-      ...{ store, session, ...arrangement, lacks, edits, messages, choose, upload: files.upload, focus, update, mix: toolbar.mix },
+      ...{ store, session, ...arrangement, lacks, edits, messages, choose, upload: files.upload, focus, update, viewport, mix: toolbar.mix, give: toolbar.give },
       strips: createStrips({ call, lacks, update }),
     }),
     strip: createStrip({ store, snapshots, focus, update }),
@@ -160,6 +162,13 @@ export function mount(root, { call, lacks = nothingLacks, live, session, storage
     const { rotation } = store.get().view, turned = Math.round(10 * (rotation + degrees)) / 10;
     edits.drag('view.rotation', commands.setView, { rotation: turned - 360 * Math.floor((turned + 180) / 360) });
     edits.settle();
+  });
+  viewport.onTap((place) => {
+    if (viewport.names.length < 2) return;
+    const seen = viewport.seenAt(place);
+    if (!seen) return;
+    store.aside(chooseCovering, seen.name);
+    messages.say(`${seen.name} is ${coveringName(store.get(), seen.name)}.`);
   });
   const stopListening = live?.onChange((online) => {
     if (online) {

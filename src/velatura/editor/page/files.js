@@ -8,13 +8,14 @@ import { objectOf } from './render/loader.js';
 import { buildScene } from './render/scene.js';
 import * as commands from './state/commands.js';
 import { documentOf, enabled, leavesOf } from './state/material.js';
-import { mixWith, objectionToMixing } from './state/parts.js';
+import { MOST, cover, mixWith, objectionToMixing } from './state/parts.js';
 import { fragmentOf, readFragment } from './state/share.js';
 
 const LETTERS = 60; // of a file name
 export const FOREIGN = ['.mtlx', '.gltf', '.glb', '.xml']; // files of other programs that hold a material
 const IMAGES = /\.(png|jpe?g|exr|hdr)$/i;
 const OBJECT = 'The object';
+const DRESSED = 'The object with its materials';
 const NAMED = 3; // parameters in a message
 const DROPPED = 'file:'; // before the names of environments and objects that were dropped on the page
 
@@ -88,6 +89,13 @@ export function createFiles({ store, session, call, lacks, storage, messages, ad
       store.run(mixWith, material);
       return messages.say(`Mixed with ${material.name || 'a material'}.${remarks(place?.imported)}`);
     },
+    /** Gives a part of the object, by its name, a material. */
+    cover(name, material, place) {
+      const wrong = objectionToMixing(store.get(), material);
+      if (wrong) return messages.complain('mix', wrong, { passing: true });
+      store.run(cover, name, material);
+      return messages.say(`${name} is made of ${material.name || 'a material'}.${remarks(place?.imported)}`);
+    },
     async save(file, version) {
       const material = documentOf(store.get());
       const off = leavesOf(store.get()).reduce((sum, { layers }) => sum + layers.length - enabled({ layers }).length, 0);
@@ -147,14 +155,19 @@ export function createFiles({ store, session, call, lacks, storage, messages, ad
 
     /** Puts a picture into the folder; the name that it has there. */
     upload: async (file) => (await call('texture', { file: file.name, data: await base64(file) })).file,
+    /** Whether a name is of light or an object that was dropped on the page. */
+    isDropped: (name) => name.startsWith(DROPPED),
     /** The name of light as Python knows it: a dropped file is put into the folder. */
     lightOf: async (name) => (name.startsWith(DROPPED) ? files.upload(await dropped(name)) : name),
     /** A dropped object as the triangles that Python takes; undefined of an object that it knows. */
     async meshOf(name) {
       if (!name.startsWith(DROPPED)) return undefined;
-      const { positions, normals, uv, triangles } = buildScene((await loadObject(await dropped(name))).parts);
+      const { parts } = await loadObject(await dropped(name));
+      const { positions, normals, uv, triangles, names } = buildScene(parts);
       const sent = Object.entries({ positions, normals, uv, triangles });
-      return Object.fromEntries(await Promise.all(sent.map(async ([key, array]) => [key, await base64(new Blob([array]))])));
+      const mesh = Object.fromEntries(await Promise.all(sent.map(async ([key, array]) => [key, await base64(new Blob([array]))])));
+      const count = (one) => parts.reduce((sum, part) => sum + (part.name === one ? part.triangles.length / 3 : 0), 0);
+      return names.length > 1 ? { ...mesh, parts: names.map((one) => ({ name: one, triangles: count(one) })) } : mesh;
     },
     takeEnvironment: (file) =>
       messages.attempt('environment', async () => {
@@ -184,10 +197,27 @@ export function createFiles({ store, session, call, lacks, storage, messages, ad
         if (!meshes && !materials) throw new Error(`${file.name}: holds neither an object nor a material`);
         if (!materials || lacks('import')) return files.takeObject(file);
         if (!meshes) return files.readFile(file, take);
-        const chosen = await ask(`${file.name} holds an object and materials`, [OBJECT, 'A material']);
+        const chosen = await ask(`${file.name} holds an object and materials`, [OBJECT, ...(take === files.open ? [DRESSED] : []), 'A material']);
         if (!chosen) return null;
+        if (chosen === DRESSED) return files.takeDressed(file);
         return chosen === OBJECT ? files.takeObject(file) : files.readFile(file, take);
       }),
+    /** Takes the object of a .gltf or .glb, and all of its materials, each for the parts that have it. */
+    async takeDressed(file) {
+      const data = await base64(file), read = (name) => call('import', { file: file.name, data, name });
+      const { names, ...one } = await read();
+      if (names?.length > MOST) throw new Error(`${file.name}: holds ${names.length} materials, more than the ${MOST} of a mixture`);
+      const answers = [];
+      for (const name of names ?? []) answers.push(await read(name));
+      const parts = answers.map(({ material }, k) => ({
+        ...(k < answers.length - 1 && { weight: 1 / answers.length }),
+        material,
+        covers: names[k].slice(0, LETTERS),
+      }));
+      const left = [one, ...answers].flatMap((answer) => answer.left ?? []);
+      files.open(one.material ?? { name: file.name.replace(/\.\w+$/, ''), mix: parts }, { imported: { file: file.name, left } });
+      return files.takeObject(file);
+    },
     /** Takes files dropped at once, `[{file, path}]`: one, or a material with its images, which are put into the folder. */
     async takeAll(list) {
       const material = list.length > 1 && list.find(({ path }) => isForeign(path));

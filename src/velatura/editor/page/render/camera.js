@@ -4,6 +4,7 @@ import { Matrix4, Spherical, Vector3 } from 'three';
 
 const TURN = 0.005; // radians a pixel
 const STEP = 0.1; // radians, or share of the distance, a key
+const STILL = 4; // pixels that a hand may move while it clicks
 const POLE = 0.01; // radians that are kept from it
 
 /** Uniforms of a camera {origin, target, fov in degrees over the shorter side} for a picture. */
@@ -30,6 +31,12 @@ export function cameraUniforms({ origin, target, fov }, width, height) {
   };
 }
 
+/** The direction, of length 1, from which light comes to a camera at a place of a picture, in pixels from the lower left. */
+export function rayOf({ camera_axes: axes, picture_size: [width, height] }, x, y) {
+  const [right, up, ahead] = [0, 3, 6].map((k) => new Vector3().fromArray(axes, k));
+  return ahead.addScaledVector(right, (2 * x) / width - 1).addScaledVector(up, (2 * y) / height - 1).normalize();
+}
+
 /** Moves a camera about its target: by so many radians, and to so many times its distance. */
 export function orbited({ origin, target, fov }, azimuth, elevation, distance = 1) {
   const from = new Vector3(...origin).sub(new Vector3(...target));
@@ -49,11 +56,12 @@ export function orbited({ origin, target, fov }, azimuth, elevation, distance = 
 
 /**
  * Calls `move(azimuth, elevation, distance)` for what hands do on a canvas, with Shift `turn(azimuth)` of the light, and `begin` and
- * `end` around it.
+ * `end` around it; `tap(x, y)`, of the canvas on the page, where they have not moved.
  */
-export function listen(canvas, { move, turn, begin, end }, signal) {
+export function listen(canvas, { move, turn, begin, end, tap }, signal) {
   const on = (name, act) => canvas.addEventListener(name, act, { signal, passive: false });
   const fingers = new Map();
+  let way = 0; // pixels since the first finger came
   const spread = () => {
     const [a, b] = fingers.values();
     return Math.hypot(a.x - b.x, a.y - b.y);
@@ -63,6 +71,7 @@ export function listen(canvas, { move, turn, begin, end }, signal) {
   on('pointerdown', (event) => {
     if (event.button !== 0) return;
     canvas.setPointerCapture(event.pointerId);
+    if (fingers.size === 0) way = 0;
     fingers.set(event.pointerId, { x: event.clientX, y: event.clientY });
     begin();
   });
@@ -70,13 +79,16 @@ export function listen(canvas, { move, turn, begin, end }, signal) {
     const before = fingers.get(event.pointerId);
     if (!before) return;
     const apart = fingers.size === 2 ? spread() : 0;
+    way += Math.hypot(event.clientX - before.x, event.clientY - before.y);
     fingers.set(event.pointerId, { x: event.clientX, y: event.clientY });
     if (fingers.size === 1 && event.shiftKey) turn(TURN * (event.clientX - before.x));
     else if (fingers.size === 1) move(TURN * (before.x - event.clientX), TURN * (before.y - event.clientY), 1);
     else if (fingers.size === 2) move(0, 0, apart / Math.max(spread(), 1));
   });
   const leave = (event) => {
-    if (fingers.delete(event.pointerId) && fingers.size === 0) end();
+    if (!fingers.delete(event.pointerId) || fingers.size > 0) return;
+    end();
+    if (event.type === 'pointerup' && way < STILL) tap(event.offsetX, event.offsetY);
   };
   on('pointerup', leave);
   on('pointercancel', leave);

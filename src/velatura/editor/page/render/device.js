@@ -149,6 +149,18 @@ export class Device {
     return pixels;
   }
 
+  /** A pixel of each texture of a target. */
+  pixel({ handle, textures }, x, y) {
+    const { gl } = this;
+    gl.bindFramebuffer(gl.FRAMEBUFFER, handle);
+    return textures.map((_, i) => {
+      const found = new Float32Array(4);
+      gl.readBuffer(gl.COLOR_ATTACHMENT0 + i);
+      gl.readPixels(x, y, 1, 1, gl.RGBA, gl.FLOAT, found);
+      return [...found];
+    });
+  }
+
   /** The same, once the device has come to it; the page's work goes on meanwhile. */
   async readLater({ handle, width, height }) {
     const { gl } = this;
@@ -299,6 +311,7 @@ const SETTERS = {
   0x8b5b: (gl, at, x) => gl.uniformMatrix3fv(at, false, x),
   0x8b5c: (gl, at, x) => gl.uniformMatrix4fv(at, false, x),
   0x1404: (gl, at, x) => gl.uniform1i(at, x),
+  0x8b55: (gl, at, x) => gl.uniform4iv(at, x),
   0x1405: (gl, at, x) => (x.length ? gl.uniform1uiv(at, x) : gl.uniform1ui(at, x)),
   0x8b56: (gl, at, x) => gl.uniform1i(at, x),
 };

@@ -5,7 +5,7 @@ import { Box3, Matrix4, Vector3, Vector4 } from 'three';
 
 import { coarsening, spreading, surroundings } from './glsl/preview.glsl.js';
 import { raster, rasterVertex } from './glsl/raster.glsl.js';
-import { OBJECT } from './scene.js';
+import { GREY } from './scene.js';
 
 const SEEN = ['RGBA16F', 'RGBA16F', 'RG32F'];
 
@@ -99,6 +99,12 @@ export class GBuffer {
     if (this.#coarse) this.#coarsen();
   }
 
+  /** What a pixel shows of the object: its normal, and the number of the part, from 0 on; null where it shows nothing of it. */
+  at(x, y) {
+    const [[nx, ny, nz, kind], [, , , part]] = this.#device.pixel(this.#seen, x, y);
+    return kind === 1 ? { normal: [nx, ny, nz], part } : null;
+  }
+
   /** Draws all around the object. */
   drawSurroundings(uniforms, target) {
     this.#device.draw(this.#surroundings, { ...uniforms, ...named(this.#seen) }, target);
@@ -162,7 +168,7 @@ function named({ textures: [normal, tangent, uv] }) {
 /** The eight corners of the box around the object. */
 function corners({ positions, materials }) {
   const box = new Box3(), point = new Vector3();
-  materials.forEach((material, i) => material === OBJECT && box.expandByPoint(point.fromArray(positions, 3 * i)));
+  materials.forEach((material, i) => material !== GREY && box.expandByPoint(point.fromArray(positions, 3 * i)));
   const { min, max } = box;
   return Array.from({ length: 8 }, (_, k) => [k & 1 ? min.x : max.x, k & 2 ? min.y : max.y, k & 4 ? min.z : max.z]);
 }

@@ -6,18 +6,17 @@ import { MeshBVH, MeshBVHUniformStruct, SAH } from 'three-mesh-bvh';
 export const NODES_WIDTH = 1024; // texels
 export const TRIANGLES_WIDTH = 2048;
 export const MAX_DEPTH = 6; // surfaces met by a path, and the light at last
-export const OBJECT = 0; // the material of its vertices
-const MATERIALS = { object: OBJECT, plinth: 1, ground: 1 };
+export const GREY = 0; // the material of vertices of the plinth and the ground; the parts of the object are numbered from 1
 const TEXELS = 8; // of a triangle
 const MOST_TRIANGLES = 500_000;
 const LEAF = 0xffff0000;
 const GRID = 0xffff;
 
 /**
- * One mesh of parts [{role, positions, normals, uv, triangles}].
+ * One mesh of parts [{role, name, positions, normals, uv, triangles}].
  *
- * @returns {{positions, normals, tangents, uv, materials, triangles}} per vertex, but for `triangles` (three vertices
- *   each).
+ * @returns {{positions, normals, tangents, uv, materials, triangles, names}} per vertex, but for `triangles` (three vertices
+ *   each), and the `names` of the parts of the object.
  */
 export function buildScene(parts) {
   const mesh = joined(parts);
@@ -34,12 +33,19 @@ export function forPaths(mesh) {
   return { ...bvh, packed: packed(mesh, tangents(mesh)) };
 }
 
+const isObject = ({ role }) => role === 'object';
+
+/** The names of the parts of an object, each once; '' of an object without parts. */
+export const namesOf = (parts) => [...new Set(parts.filter(isObject).map(({ name = '' }) => name))];
+
 function joined(parts) {
   const total = (key) => parts.reduce((sum, part) => sum + part[key].length, 0);
   if (total('triangles') / 3 > MOST_TRIANGLES) {
     throw new Error(`the object has ${total('triangles') / 3} triangles, more than ${MOST_TRIANGLES}`);
   }
+  const names = namesOf(parts);
   const mesh = {
+    names,
     positions: new Float32Array(total('positions')),
     normals: new Float32Array(total('normals')),
     uv: new Float32Array(total('uv')),
@@ -52,7 +58,8 @@ function joined(parts) {
     mesh.positions.set(part.positions, 3 * vertices);
     mesh.normals.set(part.normals, 3 * vertices);
     mesh.uv.set(part.uv, 2 * vertices);
-    mesh.materials.fill(MATERIALS[part.role], vertices, vertices + part.positions.length / 3);
+    const material = isObject(part) ? 1 + names.indexOf(part.name ?? '') : GREY;
+    mesh.materials.fill(material, vertices, vertices + part.positions.length / 3);
     mesh.triangles.set(
       part.triangles.map((i) => i + vertices),
       corners,

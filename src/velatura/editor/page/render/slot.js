@@ -2,6 +2,7 @@
 
 import { decode } from '../arrays.js';
 import { Bake } from './bake.js';
+import { MOST_PARTS } from './glsl/covering.glsl.js';
 import { adding, learning } from './glsl/display.glsl.js';
 import { lighting } from './glsl/preview.glsl.js';
 import { tracer } from './glsl/tracer.glsl.js';
@@ -30,6 +31,13 @@ export function weightsOf({ parts }, isShown) {
   return Object.fromEntries(parts.map(weights));
 }
 
+/** For each part of an object the number, from 1 on, of the part of a mixture that covers it; zeros where shares hold. */
+export function coveringOf(names, covers) {
+  const found = new Int32Array(MOST_PARTS);
+  if (covers) names.forEach((name, k) => (found[k] = name && (covers.indexOf(name) + 1 || covers.length)));
+  return found;
+}
+
 /** The entries whose names begin so, without that. */
 function within(named, begin) {
   const own = Object.entries(named).filter(([name]) => name.startsWith(begin));
@@ -39,7 +47,7 @@ function within(named, begin) {
 export class Slot {
   device;
   shader = null; // the answer of call("shader")
-  contents = null; // {values by flat name, films, solution}, as call("values") has them; maybe `coarse`, for previews alone
+  contents = null; // {values by flat name, films, solution}, as call("values") has them; maybe `coarse`, for previews alone; what its parts `covers`
   lobe = null; // the one that is shown alone, by its number
   samples = 0;
   preview = null; // the target that it is drawn to
@@ -56,6 +64,7 @@ export class Slot {
   #films = null; // tables of thin films by name: {array, shape}
   #solved = null; // what Python has worked out of each part: texels, colours of the remainder, numbers of the layout
   #placed = {}; // values by their places in the shader's struct
+  #names = ['']; // of the parts of the object
   #outdated = true; // whether the bake is of other values
   #coarse = false; // whether it is a coarse one
   #surrounded = false; // whether the preview has what is around the object
@@ -122,6 +131,12 @@ export class Slot {
     this.#drawn = null;
   }
 
+  /** Takes the names of the parts of the object. */
+  setNames(names) {
+    this.#names = names;
+    this.#drawn = null;
+  }
+
   setLobe(lobe) {
     this.lobe = lobe;
     this.#drawn = null;
@@ -139,7 +154,15 @@ export class Slot {
     const parameters = Object.entries(this.#placed).map(([place, value]) => [`vt_parameters.${place}`, value]);
     const solved = Object.entries(this.#solved ?? {}).map(([name, value]) => [`vt_${name}`, value]);
     const values = Object.fromEntries([...parameters, ...solved]);
-    return { ...values, ...this.#textures, ...weightsOf(this.shader, (k) => this.lobe === null || this.lobe === k) };
+    return { ...values, ...this.#covering(), ...this.#textures, ...weightsOf(this.shader, (k) => this.lobe === null || this.lobe === k) };
+  }
+
+  /** What covers the parts of the object; all parts of the mixture have equal shares then, so that none has nothing. */
+  #covering() {
+    const { covers } = this.contents, found = coveringOf(this.#names, covers);
+    if (!found.some(Boolean)) return { covers: found };
+    const places = covers.map((_, k) => this.shader.uniforms[`part${k}_weight`]).filter(Boolean);
+    return { covers: found, ...Object.fromEntries(places.map((place) => [`vt_parameters.${place}`, 1 / covers.length])) };
   }
 
   /** The lobes over direction of all parts, one below another. */

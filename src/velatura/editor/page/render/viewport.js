@@ -1,12 +1,12 @@
 // A material on the stage, seen in a canvas: a preview at once, then paths that are added up.
 
-import { listen, orbited } from './camera.js';
+import { listen, orbited, rayOf } from './camera.js';
 import { Device } from './device.js';
 import { prepare } from './environment.js';
 import { GBuffer } from './gbuffer.js';
 import { withLights } from './lights.js';
 import { Loader } from './loader.js';
-import { buildScene } from './scene.js';
+import { buildScene, namesOf } from './scene.js';
 import { Bands, Schedule } from './schedule.js';
 import { Screen, isTrusted } from './screen.js';
 import { Slot } from './slot.js';
@@ -45,6 +45,7 @@ export class Viewport {
   #onError;
   #listeners = new Set(); // to the camera
   #turners = new Set(); // of the light
+  #tappers = new Set(); // of places of the picture
   #stopped = new AbortController();
   #bands = new Bands();
   #slice = null; // of paths that the device is at work on
@@ -183,6 +184,12 @@ export class Viewport {
     this.#turners.add(f);
   }
 
+  /** Calls f with a place of the canvas on the page, `{x, y}`, that was clicked. Returns a function that ends this. */
+  onTap(f) {
+    this.#tappers.add(f);
+    return () => this.#tappers.delete(f);
+  }
+
   setBudget(budget) {
     this.schedule.budget = { ...this.schedule.budget, ...budget };
     this.#wake();
@@ -211,6 +218,11 @@ export class Viewport {
   /** The size of one picture in pixels: of the canvas, or of a part of it where several are side by side. */
   get frame() {
     return tileSize(this.#names().length, this.canvas);
+  }
+
+  /** The names of the parts of the object; '' alone where it has none. */
+  get names() {
+    return namesOf(this.#standing);
   }
 
   get truth() {
@@ -259,6 +271,25 @@ export class Viewport {
     const seen = this.#seen(), isPair = this.truth || seen.length > 1;
     if (this.settings.mode !== 'difference' || !isPair || !this.screen.ready || this.lost) return null;
     return this.screen.difference(seen, this.settings);
+  }
+
+  /**
+   * What a place of the canvas on the page shows of the object: the `name` of the part, the normal there, and the direction `ray`
+   * to it from the camera; null where it shows nothing of it, and beside others.
+   */
+  seenAt(place) {
+    if (this.lost || this.#names().length > 1) return null;
+    const uniforms = this.uniforms(), [x, y] = this.#pixelOf(place);
+    this.gbuffer.update(uniforms.camera_projection);
+    const found = this.gbuffer.at(x, y);
+    return found && { name: this.names[found.part], normal: found.normal, ray: rayOf(uniforms, x + 0.5, y + 0.5).toArray() };
+  }
+
+  /** The pixel at a place of the canvas on the page, from the lower left. */
+  #pixelOf({ x, y }) {
+    const { width, height, clientWidth, clientHeight } = this.canvas;
+    const within = (share, length) => Math.min(Math.max(Math.floor(share * length), 0), length - 1);
+    return [within(x / clientWidth, width), within(1 - y / clientHeight, height)];
   }
 
   /** A small square picture of another material on the same object, from here; an ImageData. */
@@ -344,6 +375,7 @@ export class Viewport {
     if (standing.length === this.#standing.length && standing.every((part, i) => part === this.#standing[i])) return;
     this.#standing = standing;
     const scene = buildScene(standing);
+    for (const slot of Object.values(this.slots)) slot.setNames(scene.names);
     this.gbuffer.setScene(scene);
     this.stage.setObject(scene);
     this.#moved();
@@ -483,7 +515,8 @@ export class Viewport {
       this.#listeners.forEach((f) => f(this.camera));
     };
     const turn = (azimuth) => this.#turners.forEach((f) => f((180 * azimuth) / Math.PI));
-    listen(canvas, { move: orbit, turn, begin: () => this.moving(true), end: () => this.moving(false) }, signal);
+    const tap = (x, y) => this.#tappers.forEach((f) => f({ x, y }));
+    listen(canvas, { move: orbit, turn, tap, begin: () => this.moving(true), end: () => this.moving(false) }, signal);
 
     const fit = new ResizeObserver(() => {
       const { clientWidth, clientHeight } = canvas;

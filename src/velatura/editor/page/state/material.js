@@ -1,8 +1,8 @@
 // A material: layers of the state from and to the document of a file, their flat values, and their shape.
 //
 // The layers of the state are those of a stack. In a mixture this is the chosen one: `parts` is the tree of all, whose
-// nodes are stacks {id, weight, name, source, thin, layers} or mixtures {id, weight, name, source, parts}, and `part` the
-// id of the chosen stack, whose node has the layers of the moment when it was chosen. The last weight among siblings is
+// nodes are stacks {id, weight, covers, name, source, thin, layers} or mixtures {id, weight, covers, name, source, parts}, and
+// `part` the id of the chosen stack, whose node has the layers of the moment when it was chosen. The last weight among siblings is
 // null: what the others leave.
 
 import { coefficientsOf, isKnown } from './pigments.js';
@@ -26,8 +26,8 @@ export function stateOf(material) {
 /** The nodes of the parts that a mixture's document lists; ids of parts and layers come after `last`. */
 export function nodesOf(mix, last) {
   let count = last;
-  const nodeOf = ({ weight = null, material }) => {
-    const node = { id: ++count, weight, name: material.name ?? '', source: material.source ?? '' };
+  const nodeOf = ({ weight = null, covers = '', material }) => {
+    const node = { id: ++count, weight, covers, name: material.name ?? '', source: material.source ?? '' };
     if (material.mix) return { ...node, parts: material.mix.map(nodeOf) };
     const layers = layersOf(material, count + 1);
     count += layers.length;
@@ -54,6 +54,9 @@ export function treeOf({ parts, part, thin, layers }) {
   return parts ? parts.map(filled) : null;
 }
 
+/** What each part of a mixture covers of an object, by name, '' for nothing; null where none covers any. */
+export const coversOf = ({ parts }) => (parts?.some(({ covers }) => covers) ? parts.map(({ covers }) => covers) : null);
+
 /** The stacks of a material, one or those of a mixture, with how their flat names begin: `{id, prefix, thin, layers}`. */
 export function leavesOf(state) {
   const within = (parts, begin) =>
@@ -77,7 +80,11 @@ export function documentOf(state) {
   const named = (node) => ({ ...(node.name && { name: node.name }), ...(node.source && { source: node.source }) });
   const written = (node) =>
     node.parts ? { ...named(node), mix: node.parts.map(part) } : { ...named(node), ...stackOf({ ...node, exterior }) };
-  const part = (node) => ({ ...(node.weight !== null && { weight: node.weight }), material: written(node) });
+  const part = (node) => ({
+    ...(node.weight !== null && { weight: node.weight }),
+    material: written(node),
+    ...(node.covers && { covers: node.covers }),
+  });
   return written({ name, source, ...(state.parts ? { parts: treeOf(state) } : state) });
 }
 

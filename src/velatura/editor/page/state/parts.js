@@ -2,10 +2,10 @@
 //
 // A command keeps the sum of the shares; where a mask is among the weights, what the last part covers is no number.
 
-import { exteriorOf, leavesOf, nodesOf, stacksOf, treeOf } from './material.js';
+import { coversOf, exteriorOf, leavesOf, nodesOf, stacksOf, treeOf } from './material.js';
 import { titled } from './store.js';
 
-const MOST = 16; // stacks of a material, as in Python
+export const MOST = 16; // stacks of a material, as in Python
 
 /** How a list or a message calls a part. */
 export const partName = ({ name, parts }, index) => name || `${parts ? 'mixture' : 'part'} ${index}`;
@@ -67,7 +67,7 @@ const simplified = (parts) =>
   parts.map((node) => {
     if (!node.parts) return node;
     const within = simplified(node.parts);
-    return within.length > 1 ? { ...node, parts: within } : { ...within[0], weight: node.weight };
+    return within.length > 1 ? { ...node, parts: within } : { ...within[0], weight: node.weight, covers: node.covers };
   });
 
 /** The state with another tree, of which a stack is chosen. A tree of one part is that part. */
@@ -161,8 +161,47 @@ export const mixWith = titled('mix with another material', (state, material) => 
   }
   const { name, source, thin, layers } = state;
   const title = name && node.name ? `${name} with ${node.name}` : '';
-  const parts = [node, { id: own, weight: null, name, source, thin, layers }];
+  const parts = [node, { id: own, weight: null, covers: '', name, source, thin, layers }];
   return choosePart({ ...state, name: title, source: '', parts, part: own }, id);
+});
+
+// Parts of an object ------------------------------------------------------------------------------------
+
+/** The node of the tree that covers a part of the object, by its name: else the last; null of a stack, or where none covers any. */
+export function nodeCovering(state, name) {
+  if (!coversOf(state)) return null;
+  const tree = treeOf(state);
+  return tree.find(({ covers }) => covers === name) ?? tree.at(-1);
+}
+
+/** How a list calls what covers a part of the object. */
+export function coveringName(state, name) {
+  const node = nodeCovering(state, name), tree = treeOf(state);
+  return node?.covers === name ? partName(node, tree.indexOf(tree.find(({ id }) => id === node.id))) : 'as the rest';
+}
+
+/** Shows the layers of what covers a part of the object. */
+export const chooseCovering = titled('choose a part', (state, name) => {
+  const node = nodeCovering(state, name);
+  if (!node || stacksOf([node]).some(({ id }) => id === state.part)) return state;
+  return choosePart(state, stacksOf([node])[0].id);
+});
+
+/** Has a part of the mixture cover a part of the object, by its name, or none: ''. */
+export const setCovers = titled('change what a part covers', (state, id, name) =>
+  change(state, id, (siblings) =>
+    siblings.map((node) => ({ ...node, covers: node.id === id ? name : node.covers === name ? '' : node.covers })),
+  ),
+);
+
+/** Gives a part of the object, by its name, a material; the others keep theirs. */
+export const cover = titled('give a part of the object a material', (state, name, material) => {
+  const own = lastId(state) + 1, { name: title, source, thin, layers } = state, tree = treeOf(state);
+  const [node] = nodesOf([{ weight: 0, material, covers: name }], own), [{ id }] = stacksOf([node]);
+  const rest = { id: own, weight: null, covers: '', name: title, source, ...(tree ? { parts: tree } : { thin, layers }) };
+  const before = coversOf(state) ? tree : [rest], place = before.findIndex(({ covers }) => covers === name);
+  const after = place < 0 ? shared(before, before.length - 1, node) : before.with(place, { ...node, weight: before[place].weight });
+  return withTree(coversOf(state) ? state : { ...state, source: '' }, after, id);
 });
 
 /** Why another material cannot be mixed with that of a state; '' where it can. */

@@ -2,7 +2,7 @@
 
 import { Offline } from '../connection.js';
 import { isOfMaterials, isPaired } from './compared.js';
-import { documentOf, flat, numbersOf, pattern, stacksAsText, stateOf, treeOf, weightsOf } from './material.js';
+import { coversOf, documentOf, flat, numbersOf, pattern, stacksAsText, stateOf, treeOf, weightsOf } from './material.js';
 import { Solutions } from './solutions.js';
 import { transformOf } from './transform.js';
 
@@ -106,7 +106,7 @@ class Slot {
   #setContents(contents, state) {
     const { viewport, onBaked } = this.#services, name = this.#name;
     if (state.document !== this.given?.document) viewport.forget(name);
-    viewport.setContents(name, contents);
+    viewport.setContents(name, { ...contents, covers: coversOf(state) });
     this.#contents = contents;
     this.given = state;
     onBaked(name);
@@ -201,7 +201,7 @@ function otherOf(state, session) {
  * Follows a store: `{shader(slot), drawn(slot), given(slot), stage, quiet, again(), stop()}`; `given` is the state that is
  * drawn, `stage` what takes time (`solving`, `compiling` or null), and `again` asks anew what could not be asked.
  */
-export function follow({ store, viewport, call, lacks, session, files, onProblem, onBaked, onShader }) {
+export function follow({ store, viewport, call, lacks, session, files, onProblem, onBaked, onShader, onObject }) {
   const part = { viewport, call, lacks, session, onShader, onProblem, onBaked };
   const slots = Object.fromEntries(Object.keys(viewport.slots).map((name) => [name, new Slot(name, part)]));
   const shown = {};
@@ -242,6 +242,7 @@ export function follow({ store, viewport, call, lacks, session, files, onProblem
       await viewport.setObject(await files.object(name));
       home = viewport.camera;
       viewport.setCamera(store.get().camera ?? home);
+      onObject();
     });
     once('environment', environment, async (name) => viewport.setEnvironment(await files.environment(name)));
     once('lights', lights, async () => viewport.setLights(lights));

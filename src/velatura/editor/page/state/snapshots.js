@@ -1,7 +1,7 @@
 // The history of the material in pictures: each state that was left alone for a while, to return to.
 
 import { keptOf } from './compared.js';
-import { enabled, leavesOf, treeOf, weightsOf } from './material.js';
+import { coversOf, enabled, leavesOf, treeOf, weightsOf } from './material.js';
 
 const MOST = 40;
 const SIZE = [144, 108]; // pixels of a picture
@@ -13,7 +13,7 @@ export function lookOf(state) {
   const ofLayer = ({ kind, keys }) => [kind, Object.entries(keys).sort()];
   const stacks = leavesOf(state).map(({ prefix, thin, layers }) => [prefix, thin, enabled({ layers }).map(ofLayer)]);
   const weights = weightsOf(treeOf(state) ?? []);
-  return JSON.stringify([state.exterior, stacks, weights, state.model, Object.entries(state.switches).sort()]);
+  return JSON.stringify([state.exterior, stacks, weights, coversOf(state), state.model, Object.entries(state.switches).sort()]);
 }
 
 /**

@@ -9,8 +9,8 @@ const SAMPLES = 4; // per pixel of one call
 const PASSES = 32;
 const LONGEST = 360; // pixels along a side
 
-/** Follows a store while its view asks for the truth; `onProblem(error)` with null where there is none. */
-export function followTruth({ store, viewport, call, onProblem }) {
+/** Follows a store while its view asks for the truth; `files` knows what was dropped; `onProblem(error)` with null where there is none. */
+export function followTruth({ store, viewport, call, files, onProblem }) {
   let wanted = null; // what is being computed
   let timer = null;
 
@@ -27,12 +27,15 @@ export function followTruth({ store, viewport, call, onProblem }) {
 
   async function add() {
     const question = questionOf(store.get(), viewport); // the camera may have come to its place since
+    if (!question) return;
     const text = (wanted = JSON.stringify(question));
     let sum = null;
     try {
-      const light = question?.lights.length ? await sent(viewport.lighting) : undefined;
+      const { object, environment, lights } = question, isOwn = files.isDropped(environment);
+      const light = lights.length || isOwn ? await sent(viewport.lighting) : undefined;
+      const shot = { ...question, environment: isOwn ? undefined : environment, mesh: await files.meshOf(object), light };
       for (let seed = 1; seed <= PASSES; seed++) {
-        const { picture } = await call('truth', { ...question, light, spp: SAMPLES, seed });
+        const { picture } = await call('truth', { ...shot, spp: SAMPLES, seed });
         if (text !== wanted) return;
         const { array, shape } = decode(picture);
         sum = sum ? sum.map((value, index) => value + array[index]) : array;

@@ -22,7 +22,7 @@ import { capital, flag, iconButton, menu, numberField, shown } from './controls.
 import { icons } from './icons.js';
 import { grip } from './moving.js';
 import { hasTint, parameter, parametersOf, tintOf } from './parameter.js';
-import { parts } from './parts.js';
+import { objectParts, parts } from './parts.js';
 import { text } from './typing.js';
 
 const VARIANTS = [
@@ -44,7 +44,7 @@ export function createLayers(services) {
 function layers(panel) {
   const state = panel.store.get();
   return html`
-    ${top(panel, state)} ${notCarried(placeOf(state).imported)} ${parts(panel)} ${panel.cards.tools()}
+    ${top(panel, state)} ${notCarried(placeOf(state).imported)} ${objectParts(panel)} ${parts(panel)} ${panel.cards.tools()}
     <ol class="layers">
       ${repeat(
         state.layers,

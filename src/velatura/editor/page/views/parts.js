@@ -2,20 +2,24 @@
 
 import { html, nothing } from 'lit-html';
 import { repeat } from 'lit-html/directives/repeat.js';
-import { treeOf } from '../state/material.js';
+import { stacksOf, treeOf } from '../state/material.js';
 import {
+  chooseCovering,
   choosePart,
+  coveringName,
   duplicatePart,
   mostOf,
   movePart,
+  nodeCovering,
   objectionTo,
   partName,
   removePart,
   renamePart,
+  setCovers,
   setWeight,
   sharesOf,
 } from '../state/parts.js';
-import { iconButton, shown } from './controls.js';
+import { iconButton, menu, shown } from './controls.js';
 import { grip } from './moving.js';
 import { row } from './parameter.js';
 import { text } from './typing.js';
@@ -85,6 +89,7 @@ function card(panel, siblings, node, index) {
       </span>
     </div>
     ${node.weight === null ? rest(siblings) : weight(panel, siblings, node, name)}
+    ${covers(panel, node, name)}
     ${node.parts ? list(panel, node.parts) : nothing}
   </li>`;
 }
@@ -102,6 +107,42 @@ function weight(panel, siblings, node, name) {
     span: [0, 1],
     plain: Math.min(0.5, high),
   });
+}
+
+/** The part of the object that a part of the mixture has the whole of. */
+function covers({ store, viewport }, { id, covers: chosen, weight }, name) {
+  const { names } = viewport, isTop = treeOf(store.get()).some((node) => node.id === id);
+  if (!chosen && (!isTop || weight === null || names.length < 2)) return nothing;
+  const known = names.includes(chosen) || !chosen ? names : [...names, chosen];
+  const options = [['', 'Its share of all'], ...known.map((one) => [one, names.includes(one) ? one : `${one} (not of this object)`])];
+  const choose = (one) => store.run(setCovers, id, one);
+  return html`<div class="parameter">
+    <span class="name">Covers</span><span class="extras"></span>
+    <div class="control">${menu({ label: `What ${name} covers`, value: chosen, options, choose })}</div>
+  </div>`;
+}
+
+/** The parts of the object, each with the material that covers it; a button gives it another one. */
+export function objectParts({ store, viewport, give, lacks }) {
+  const { names } = viewport, state = store.get();
+  if (names.length < 2) return nothing;
+  const part = (name) => {
+    const node = nodeCovering(state, name);
+    const isChosen = node && stacksOf([node]).some(({ id }) => id === state.part);
+    return html`<li>
+      <button type="button" class="name" aria-pressed=${Boolean(isChosen)} ?disabled=${!node} title="Show its layers" @click=${() => store.aside(chooseCovering, name)}>
+        ${name}
+      </button>
+      <span>${coveringName(state, name)}</span>
+      <button type="button" aria-label=${`Material of ${name}`} ?disabled=${lacks('mix')} title=${lacks('mix') || `Choose what ${name} is made of`} @click=${() => give(name)}>
+        Material …
+      </button>
+    </li>`;
+  };
+  return html`<section class="object-parts" aria-label="Parts of the object">
+    <h2>Parts of the object</h2>
+    <ul>${names.map(part)}</ul>
+  </section>`;
 }
 
 /** The share of the last part. */

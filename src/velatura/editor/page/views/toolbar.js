@@ -10,7 +10,9 @@ import { createExports } from './exporting.js';
 import { createLibrary } from './library.js';
 import { createRendering } from './rendering.js';
 
-/** `view()`, `saveAs()` and `saveAgain()` as its buttons do, and `mix()`, which chooses what the material is mixed with. */
+const OPENING = { label: 'Open a material' };
+
+/** `view()`, `saveAs()` and `saveAgain()` as its buttons do, `mix()`, which chooses what the material is mixed with, and `give(name)`, what a part of the object is made of. */
 export function createToolbar(services) {
   const { store, files } = services;
   const dialogs = { open: createRef(), save: createRef() };
@@ -22,15 +24,16 @@ export function createToolbar(services) {
     library: createLibrary(services),
     targets: null, // of the papers
     sought: '', // in the titles of what can be opened
-    mixing: false, // whether what is chosen is mixed with the material, and not opened
+    choosing: OPENING, // what is done with what is chosen
     saveAs: () => dialogs.save.value.showModal(),
     saveAgain() {
       const { file, version } = placeOf(store.get());
       return file ? files.save(file, version) : bar.saveAs();
     },
   };
-  const mix = () => openDialog(bar, true);
-  return { view: () => toolbar(bar), saveAs: bar.saveAs, saveAgain: bar.saveAgain, mix };
+  const mix = () => openDialog(bar, { label: 'Mix with a material', take: files.mix });
+  const give = (name) => openDialog(bar, { label: `Material of ${name}`, take: (material, place) => files.cover(name, material, place) });
+  return { view: () => toolbar(bar), saveAs: bar.saveAs, saveAgain: bar.saveAgain, mix, give };
 }
 
 function toolbar(bar) {
@@ -77,20 +80,20 @@ const step = (word, icon, act, can, title) =>
 
 // Open -----------------------------------------------------------------------------------------------
 
-async function openDialog(bar, mixing = false) {
-  bar.mixing = mixing;
+async function openDialog(bar, choosing = OPENING) {
+  bar.choosing = choosing;
   bar.sought = '';
   bar.update();
   bar.dialogs.open.value.showModal();
   await bar.library.read();
   bar.update();
-  if (!mixing && !bar.lacks('targets')) await bar.messages.attempt('targets', async () => (bar.targets ??= (await bar.call('targets', {})).targets));
+  if (choosing === OPENING && !bar.lacks('targets')) await bar.messages.attempt('targets', async () => (bar.targets ??= (await bar.call('targets', {})).targets));
   bar.update();
 }
 
 function openPanel(bar) {
   const close = () => bar.dialogs.open.value.close();
-  const { mixing } = bar, take = mixing ? bar.files.mix : bar.files.open;
+  const { label, take = bar.files.open } = bar.choosing, opening = bar.choosing === OPENING;
   const sought = bar.sought.trim().toLowerCase();
   const found = (entries) => entries.filter(({ title, name = '' }) => [title.toLowerCase(), name].some((text) => text.includes(sought)));
   const fromHere = async () => {
@@ -124,20 +127,20 @@ function openPanel(bar) {
     const these = found(entries);
     return these.length || (empty && !sought) ? section(title, these, empty) : nothing;
   };
-  return html`<dialog class="open" aria-label=${mixing ? 'Mix with a material' : 'Open a material'} ${ref(bar.dialogs.open)}>
+  return html`<dialog class="open" aria-label=${label} ${ref(bar.dialogs.open)}>
     <div class="head">
       <input type="search" aria-label="Search" placeholder="Search" .value=${live(bar.sought)} @input=${seek} @keydown=${first} />
       ${
-        mixing
-          ? html`<button type="button" @click=${() => close() || take(bar.files.fresh())}>A new stack</button>`
-          : nothing
+        opening
+          ? nothing
+          : html`<button type="button" @click=${() => close() || take(bar.files.fresh())}>A new stack</button>`
       }
       <button type="button" @click=${() => close() || fromHere()}>From this computer</button>
       <button type="button" @click=${close}>Cancel</button>
     </div>
     ${groups.map((name) => some(name, byTitle(presets.filter(({ group }) => group === name))))}
     ${bar.library.view(sought, (file) => close() || bar.files.openFile(file, take))}
-    ${mixing ? nothing : some('From the papers', targets, html`<p>${bar.lacks('targets') || 'On their way.'}</p>`)}
+    ${!opening ? nothing : some('From the papers', targets, html`<p>${bar.lacks('targets') || 'On their way.'}</p>`)}
   </dialog>`;
 }
 

@@ -1,6 +1,7 @@
 // The picture without paths: every lobe by a few directions, each looking into a blurred environment.
 
 import { camera } from './camera.glsl.js';
+import { covering } from './covering.glsl.js';
 import { blurredEnvironment } from './environment.glsl.js';
 
 const SAMPLES = 3; // of a lobe
@@ -12,6 +13,7 @@ export const lighting = (shader) => `#version 300 es
 ${shader.text}
 ${camera}
 ${blurredEnvironment}
+${covering(shader)}
 ${parts(shader)}
 ${OBJECT}`;
 
@@ -54,14 +56,14 @@ void main() {
   vec3 ray = camera_ray(float(seen_every) * gl_FragCoord.xy);
   vec4 normal = texelFetch(seen_normal, pixel, 0);
   if (normal.w != 1.0) discard;
-  vec3 n = normal.xyz, tangent = texelFetch(seen_tangent, pixel, 0).xyz;
-  vec3 s = normalize(tangent - n * dot(n, tangent)), t = cross(n, s);
+  vec4 tangent = texelFetch(seen_tangent, pixel, 0);
+  vec3 n = normal.xyz, s = normalize(tangent.xyz - n * dot(n, tangent.xyz)), t = cross(n, s);
   vec3 wi = -vec3(dot(ray, s), dot(ray, t), dot(ray, n));
   wi = normalize(vec3(wi.xy, max(wi.z, 1e-3)));
 
   // Divide all numbers among the lobes
   VtMaterial m = vt_material(texelFetch(seen_uv, pixel, 0).xy);
-  VtLobes l = vt_lobes(m, wi);
+  VtLobes l = on_part(vt_lobes(m, wi), int(tangent.w));
   float shares[PARTS] = part_shares(l);
   float total = 0.0, before = 0.0;
   for (int k = 0; k < PARTS; k++) total += shares[k];

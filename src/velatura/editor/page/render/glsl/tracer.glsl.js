@@ -1,8 +1,9 @@
 // One path through every pixel: the environment by visible normals and by itself, weighed by the power
 // heuristic.
 
-import { MAX_DEPTH } from '../scene.js';
+import { GREY, MAX_DEPTH } from '../scene.js';
 import { camera } from './camera.glsl.js';
+import { covering } from './covering.glsl.js';
 import { environment } from './environment.glsl.js';
 import { random } from './random.glsl.js';
 import { scene } from './scene.glsl.js';
@@ -14,6 +15,7 @@ ${random}
 ${camera}
 ${environment}
 ${scene}
+${covering(shader)}
 ${PATH}`;
 
 const PATH = /* glsl */ `
@@ -22,13 +24,13 @@ out vec4 radiance;
 
 // Value and density of a surface; the grey one reflects 18 percent, diffusely
 vec4 surface_eval_pdf(int material, VtMaterial m, VtLobes l, vec3 wi, vec3 wo) {
-  if (material == 0) return vt_eval_pdf(m, l, wi, wo);
+  if (material != ${GREY}) return vt_eval_pdf(m, l, wi, wo);
   float cos_o = wi.z > 0.0 ? max(wo.z, 0.0) : 0.0;
   return vec4(vec3(0.18), 1.0) * cos_o / 3.14159265;
 }
 
 vec3 surface_sample(int material, VtMaterial m, VtLobes l, vec3 wi, vec3 u) {
-  if (material == 0) return vt_sample(m, l, wi, u);
+  if (material != ${GREY}) return vt_sample(m, l, wi, u);
   float r = sqrt(u.y), phi = 6.2831853 * u.z;
   return vec3(r * cos(phi), r * sin(phi), sqrt(1.0 - u.y));
 }
@@ -71,9 +73,9 @@ void main() {
       // Look at the surface, and draw a light
       point = scene_point(hit);
       wi = -vec3(dot(direction, point.s), dot(direction, point.t), dot(direction, point.n));
-      if (point.material == 0) {
+      if (point.material != ${GREY}) {
         m = vt_material(point.uv);
-        l = vt_lobes(m, wi);
+        l = on_part(vt_lobes(m, wi), point.material - 1);
       }
       direction = environment_sample(random_pair(dimension));
       light = environment_eval(direction);
