@@ -23,6 +23,7 @@ import tempfile
 import threading
 import traceback
 from collections.abc import Callable, Iterator
+from contextvars import ContextVar
 from pathlib import Path
 from types import ModuleType
 from typing import TYPE_CHECKING, Any, NamedTuple
@@ -45,6 +46,7 @@ _MINIMUM = "import drjit, drjit.llvm as llvm; print(drjit.minimum(llvm.Float([1,
 _factories: dict[str, Factory] = {}
 _registered: set[tuple[str, str]] = set()
 _threads: int | None = None  # of Dr.Jit, None for as many as it likes
+_compiled_first = ContextVar("compiled_first", default=False)
 
 
 # One thread at a time
@@ -292,6 +294,21 @@ def threads_restored() -> Iterator[None]:
         if _threads is not None and "drjit" in sys.modules:
             sys.modules["drjit"].set_thread_count(before)
         _threads = None
+
+
+@contextlib.contextmanager
+def compiled_first() -> Iterator[None]:
+    """In the block, run by kernels what has any, the first time as well: what is found is then the same, bit by bit,
+    whatever this process has computed before, or others have left on disk."""
+    before = _compiled_first.set(True)
+    try:
+        yield
+    finally:
+        _compiled_first.reset(before)
+
+
+def compiles_first() -> bool:
+    return _compiled_first.get()
 
 
 @contextlib.contextmanager

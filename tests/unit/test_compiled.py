@@ -9,8 +9,7 @@ import numpy as np
 import pytest
 
 import velatura as vt
-from velatura import ops
-from velatura.kernel import vector_width
+from velatura import kernel, ops
 from velatura.model import named
 from velatura.model.context import Context
 from velatura.model.rough_interface import KEPT
@@ -74,8 +73,8 @@ def test_kernels_and_numpy_agree(monkeypatch: pytest.MonkeyPatch) -> None:
             by_kernels(patched)
             found = compiled.over(function, sources, SAMPLES, numbers(), ROWS)
         assert sums.shape == (4, count) and largest.shape == (2, count) and light.shape == (3, 2, ROWS + 1, count)
-        for plain, kernel in zip([sums, largest, light], [*found[:2], *found[2]]):
-            assert kernel == pytest.approx(plain, abs=1e-12)
+        for plain, fused in zip([sums, largest, light], [*found[:2], *found[2]]):
+            assert fused == pytest.approx(plain, abs=1e-12)
     product = sources[0][:, None] * SAMPLES[0]
     assert largest[0] == pytest.approx((0.7 * np.cos(product) + 0.25).max(axis=1), abs=1e-15)
     assert sums[2] == pytest.approx(0.9 * product.sum(axis=1), abs=1e-14)
@@ -88,7 +87,7 @@ def test_one_thread_takes_as_many_sources_as_dr_jit_s_vectors_hold() -> None:
     with dr.scoped_set_flag(dr.JitFlag.KernelHistory, True):
         dr.eval(dr.arange(dr.llvm.UInt32, 3) * 5)
         written = dr.kernel_history([dr.KernelType.JIT])[-1]["ir"].getvalue()
-    assert f"<{vector_width()} x i32>" in written
+    assert f"<{kernel.vector_width()} x i32>" in written
 
 
 def read(sources: Any, samples: Any, numbers: Any) -> Found:
@@ -104,8 +103,8 @@ def test_kernels_read_tables(monkeypatch: pytest.MonkeyPatch) -> None:
     sources = [np.linspace(0.1, 1.0, 7), np.linspace(0.9, 0.0, 7)]
     sums, largest, _ = compiled.over(read, sources, SAMPLES, given)
     by_kernels(monkeypatch)
-    for kernel, plain in zip(compiled.over(read, sources, SAMPLES, given), (sums, largest)):
-        assert kernel == pytest.approx(plain, abs=1e-12)
+    for fused, plain in zip(compiled.over(read, sources, SAMPLES, given), (sums, largest)):
+        assert fused == pytest.approx(plain, abs=1e-12)
     # Samples of the last source lie along the first azimuth, at the nodes
     assert largest[0, -1] == pytest.approx(table.data[:, 0, 3].max(), abs=1e-12)
 
@@ -152,6 +151,24 @@ def test_kernels_that_are_kept_on_disk_are_used_at_once(monkeypatch: pytest.Monk
     compiled._mark.cache_clear()
 
 
+def test_kernels_are_used_at_once_where_results_must_not_depend_on_the_past(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    monkeypatch.setenv("DRJIT_CACHE_DIR", str(tmp_path))
+    monkeypatch.setattr(compiled, "LEAST", 0)
+    monkeypatch.setattr(compiled, "_mark", lambda kind: tmp_path / "none")
+    plain, found = [], []
+    original = compiled._plain
+    monkeypatch.setattr(compiled, "_plain", lambda *values: plain.append(len(values[1][0])) or original(*values))
+    for memory in (compiled._kernels.clear, compiled._asked.clear):
+        memory()
+    with kernel.compiled_first():
+        for _ in range(3):
+            found.append(compiled.over(function, SOURCES, SAMPLES, numbers(), ROWS))
+    assert plain == [1]  # which shows what a kernel of the kind returns
+    assert len({(sums.tobytes(), largest.tobytes(), light.tobytes()) for sums, largest, (light,) in found}) == 1
+
+
 def test_another_number_or_address_needs_no_other_kernel(monkeypatch: pytest.MonkeyPatch) -> None:
     import drjit as dr
 
@@ -192,8 +209,8 @@ def test_the_symmetric_form_is_the_same_by_numpy_and_by_kernels(monkeypatch: pyt
             body = solve(material, named("velatura", form="symmetric"), variance_kind(material), Context())
             x, y, z = np.array([-0.6, 0.0, -0.4]), np.array([0.0, 0.6, 0.0]), np.array([0.8, 0.8, -0.9])
             found.append(np.array([*body.eval_pdf((0 * x + 0.6, 0 * x, 0 * x + 0.8), (x, y, z))[0]]))
-    for plain, kernel in zip(found[:2], found[2:]):
-        assert np.any(plain > 0.1) and kernel == pytest.approx(plain, abs=1e-7)
+    for plain, fused in zip(found[:2], found[2:]):
+        assert np.any(plain > 0.1) and fused == pytest.approx(plain, abs=1e-7)
 
 
 def test_what_was_asked_for_last_is_kept_up_to_a_size() -> None:

@@ -107,7 +107,7 @@ def over(
             kind = function.__module__, function.__qualname__, kind, *(x.ndim for x in samples), _kind(numbers, read)
             _asked[kind] += width * count
             many = _asked[kind] > (MANY_DEPOSITED if rows else MANY)
-            kernels = kernel.llvm() if many or _mark(kind).exists() else None
+            kernels = kernel.llvm() if many or kernel.compiles_first() or _mark(kind).exists() else None
             if kernels:
                 return _compiled(kernels, kind, function, sources, samples, numbers, read, rows)
     size = max(BLOCK // count, 1)

@@ -79,7 +79,8 @@ def look(packed: bytes, numbers: Sequence[int]) -> list[Answered]:
     found: list[Answered] = []
     for values, seed in zip(plan.points(numbers), plan.seeds(numbers)):
         try:
-            found.append(_named(ask(plan.stack(values), seed, **plan.options)))
+            with kernel.compiled_first():  # rather than by NumPy until a process has done much
+                found.append(_named(ask(plan.stack(values), seed, **plan.options)))
         except MissingTool:
             raise
         except VelaturaError as error:
