@@ -1,5 +1,6 @@
 """Functions over many samples: the same by NumPy and by a kernel; and results that are kept."""
 
+import gc
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
@@ -157,16 +158,41 @@ def test_kernels_are_used_at_once_where_results_must_not_depend_on_the_past(
     monkeypatch.setenv("DRJIT_CACHE_DIR", str(tmp_path))
     monkeypatch.setattr(compiled, "LEAST", 0)
     monkeypatch.setattr(compiled, "_mark", lambda kind: tmp_path / "none")
-    plain, found = [], []
+    plain: list[int] = []
     original = compiled._plain
-    monkeypatch.setattr(compiled, "_plain", lambda *values: plain.append(len(values[1][0])) or original(*values))
+
+    def counted(function: Any, sources: Any, *others: Any) -> Any:
+        plain.append(len(sources[0]))
+        return original(function, sources, *others)
+
+    monkeypatch.setattr(compiled, "_plain", counted)
     for memory in (compiled._kernels.clear, compiled._asked.clear):
         memory()
     with kernel.compiled_first():
-        for _ in range(3):
-            found.append(compiled.over(function, SOURCES, SAMPLES, numbers(), ROWS))
+        found = [compiled.over(function, SOURCES, SAMPLES, numbers(), ROWS) for _ in range(3)]
     assert plain == [1]  # which shows what a kernel of the kind returns
     assert len({(sums.tobytes(), largest.tobytes(), light.tobytes()) for sums, largest, (light,) in found}) == 1
+
+
+def test_garbage_waits_until_a_kernel_is_recorded(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Rationale: Dr.Jit ended the process where an array of NumPy's in a circle was freed while it recorded."""
+    import drjit as dr
+
+    by_kernels(monkeypatch)
+    arrays = [dr.llvm.Float64(np.arange(1000.0)) for _ in range(20)]
+
+    def littering(sources: Any, *given: Any) -> Found:
+        while arrays and not isinstance(sources[0], np.ndarray):
+            circle: list[Any] = [arrays.pop()]
+            circle.append(circle)
+        return function(sources, *given)
+
+    thresholds = gc.get_threshold()
+    gc.set_threshold(1)
+    try:
+        compiled.over(littering, SOURCES, SAMPLES, numbers(), ROWS)
+    finally:
+        gc.set_threshold(*thresholds)
 
 
 def test_another_number_or_address_needs_no_other_kernel(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -10,10 +10,11 @@ from __future__ import annotations
 import contextlib
 import copy
 import functools
+import gc
 import hashlib
 import itertools
 from collections import Counter, OrderedDict
-from collections.abc import Callable, Hashable, Sequence
+from collections.abc import Callable, Hashable, Iterator, Sequence
 from dataclasses import dataclass, fields, is_dataclass, replace
 from pathlib import Path
 from threading import Lock
@@ -214,7 +215,8 @@ def _compiled(
             [dr.opaque(module.Float64, 0.0, (rows + 1) * width * part) for _, part in _packets(values * waves)]
             for values, waves in of_kind.lights
         ]
-        found, outs = of_kind.launch(_numbered(module.UInt32, lanes), *given, found, outs)
+        with _uncollected():
+            found, outs = of_kind.launch(_numbered(module.UInt32, lanes), *given, found, outs)
         totals, greatest, _ = np.split(found.numpy().reshape(-1, width), np.cumsum(of_kind.counts))
         lights = []
         for (values, waves), parts in zip(of_kind.lights, outs):
@@ -292,6 +294,18 @@ def _kernel(
 
     frozen = dr.freeze(launch, limit=SIZES, warn_after=1 << 30)
     return _Kernel(frozen, counts, [light.shape[:2] for light in once[2]])
+
+
+@contextlib.contextmanager
+def _uncollected() -> Iterator[None]:
+    """Collect no garbage in the block: an array of NumPy's that Dr.Jit lets go while it records ends the process."""
+    enabled = gc.isenabled()
+    gc.disable()
+    try:
+        yield
+    finally:
+        if enabled:
+            gc.enable()
 
 
 @functools.lru_cache(maxsize=256)
