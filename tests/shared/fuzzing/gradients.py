@@ -10,15 +10,17 @@ from numpy.typing import NDArray
 
 import velatura as vt
 from fuzzing import Failure
-from fuzzing.stacks import random_stack
+from fuzzing.stacks import drawn_anew, random_stack
 from velatura import kernel
 from velatura.renderer.differentiated import RELATIVE, RELATIVES, STEPS
 from velatura.stack import Address
 
 Array = NDArray[np.floating]
 
+PATTERNS = 12  # stacks whose BSDFs, and so whose kernels, most trials share
+OWN = 0.1  # share of trials with a BSDF of their own
 MOST = 4  # values of a stack that are tried
-SAMPLES = 1 << 16
+SAMPLES = 1 << 14
 SMOOTH = 0.01  # roughness of stacks that are not tried
 OFF = 0.1  # of a difference, by which a gradient may be off
 CLOSE, STAYS = 0.01, 0.25  # share of a step, and of the light that changes over the whole one, where light jumps
@@ -27,28 +29,40 @@ UNEVEN = 2e-3  # of the light, by which values of either end may be off
 
 
 def trial(rng: np.random.Generator) -> list[Failure]:
-    """One tame random stack that is not smooth, and some of its values."""
+    """Some values of a tame random stack that is not smooth: mostly of a pattern, whose kernels other trials share."""
+    if rng.random() < OWN:
+        return tried(_rough_stack(rng), rng)
+    pattern = _rough_stack(np.random.default_rng((int(rng.integers(PATTERNS)), *b"pattern")))
+    return tried(drawn_anew(pattern, rng), rng, pattern)
+
+
+def _rough_stack(rng: np.random.Generator) -> vt.Stack:
     while True:
         stack = random_stack(rng, most=2)
         if any(x > SMOOTH for at, x in stack.values() if "alpha" in at.role and isinstance(x, float)):
-            return tried(stack, rng)
+            return stack
 
 
-def tried(stack: vt.Stack, rng: np.random.Generator) -> list[Failure]:
-    """Failures of the gradients of a stack."""
+def tried(stack: vt.Stack, rng: np.random.Generator, pattern: vt.Stack | None = None) -> list[Failure]:
+    """Failures of the gradients of a stack: of its own BSDF, or that of a pattern which is given its values."""
     case = {"material": stack.to_dict()}
     try:
-        return [Failure(kind, detail, case) for kind, detail in _found(stack, rng)]
+        return [Failure(kind, detail, case) for kind, detail in _found(stack, rng, pattern)]
     except Exception as error:
         return [Failure(f"raised {type(error).__name__}", str(error).strip().splitlines()[-1], case)]
 
 
-def _found(stack: vt.Stack, rng: np.random.Generator) -> list[tuple[str, str]]:
+def _found(stack: vt.Stack, rng: np.random.Generator, pattern: vt.Stack | None) -> list[tuple[str, str]]:
     mi = kernel.mitsuba("llvm_ad_rgb")
     import drjit as dr
 
-    bsdf = vt.bsdf(stack)
+    bsdf = vt.bsdf(pattern or stack)
     parameters = mi.traverse(bsdf)
+    before = pattern.flat() if pattern else stack.flat()
+    for name, value in stack.flat().items():
+        if value != before[name]:
+            parameters[name] = (mi.Color3f if isinstance(value, tuple) else mi.Float)(value)
+    parameters.update()
     given = {at: np.ravel(parameters[at.name]).astype(float) for at, _ in stack.values() if at.declared.differentiable}
     given = {at: x for at, x in given.items() if x.any()}
     chosen = [list(given)[k] for k in rng.permutation(len(given))[:MOST]]
@@ -63,13 +77,16 @@ def _found(stack: vt.Stack, rng: np.random.Generator) -> list[tuple[str, str]]:
     share = dr.select(drawn.pdf > 0, (1 + drawn.wo.x) / (SAMPLES * dr.maximum(drawn.pdf, 1e-6)), 0)
     dr.eval(si.wi, drawn.wo, share)
 
-    def lights(bsdf: Any) -> Any:
-        return dr.mean(bsdf.eval(context, si, drawn.wo)) * share
+    # Called as in renderings: gradients of a plain call compile one kernel for each use of a number
+    called = dr.opaque(mi.BSDFPtr, bsdf, SAMPLES)
 
-    def light(bsdf: Any) -> Any:
-        return dr.sum(lights(bsdf))
+    def lights() -> Any:
+        return dr.mean(called.eval(context, si, drawn.wo)) * share
 
-    whole = float(light(bsdf)[0])
+    def light() -> Any:
+        return dr.sum(lights())
+
+    whole = float(light()[0])
     found: list[tuple[str, str]] = []
     for at in chosen:
         x = given[at]
@@ -82,18 +99,18 @@ def _found(stack: vt.Stack, rng: np.random.Generator) -> list[tuple[str, str]]:
             return scale
 
         def noise(variable: Callable[[], Any] = variable) -> float:
-            scale, each = variable(), lights(bsdf)
+            scale, each = variable(), lights()
             dr.forward(scale, flags=dr.ADFlag.Default | dr.ADFlag.AllowNoGrad)
             return float(np.std(np.array(dr.grad(each))) * np.sqrt(SAMPLES))
 
         scale = variable()
-        dr.backward(light(bsdf), flags=dr.ADFlag.Default | dr.ADFlag.AllowNoGrad)
+        dr.backward(light(), flags=dr.ADFlag.Default | dr.ADFlag.AllowNoGrad)
         gradient = float(dr.grad(scale)[0])
 
         def scaled(by: float, at: Address = at, x: Array = x) -> float:
             parameters[at.name] = (mi.Color3f if len(x) > 1 else mi.Float)((by * x).tolist())
             parameters.update()
-            return float(light(bsdf)[0])
+            return float(light()[0])
 
         step = max(RELATIVES.get(at.role, RELATIVE), STEPS.get(at.role, 0) / float(np.abs(x).max()))
         low, high = at.declared.within

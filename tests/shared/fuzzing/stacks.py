@@ -95,6 +95,36 @@ def textured(stack: Stack, rng: np.random.Generator, image: str) -> Stack:
     return stack.replace(**values)
 
 
+def drawn_anew(stack: Stack, rng: np.random.Generator) -> Stack:
+    """The stack with other numbers, whose kernels are nearly the same: those that are 0 or 1, names, and the exterior
+    stay, and so do grey colours and axes that are alike."""
+    draw = _Tame(rng)
+    alpha = lambda: draw.any(lambda: draw.uniform(0.02, 0.6), lambda: 10 ** draw.uniform(-2.3, 0))  # noqa: E731
+    numbers: dict[str, Callable[[], float]] = {
+        "eta": lambda: draw.any(lambda: draw.uniform(1, 2.5), lambda: draw.uniform(1.2, 1.8)),
+        "k": lambda: draw.uniform(0.5, 6),
+        "alpha_u": alpha,
+        "alpha_v": alpha,
+        "rotation": lambda: draw.uniform(-180, 180),
+        "depth": lambda: draw.any(lambda: draw.uniform(0.1, 2), lambda: draw.uniform(0.01, 0.1)),
+        "sigma_a": lambda: draw.uniform(0.01, 2),
+        "sigma_s": lambda: draw.uniform(0.01, 2),
+        "g": lambda: draw.any(lambda: draw.uniform(-0.9, 0.95), lambda: draw.uniform(0.5, 0.98)),
+        "albedo": lambda: draw.uniform(0.01, 1),
+    }
+    flat, found = stack.flat(), dict[str, Any]()
+    for name, value in flat.items():
+        key = name.partition("_")[2]
+        if key not in numbers or not isinstance(value, float | tuple) or set(np.ravel(value)) <= {0.0, 1.0}:
+            continue
+        along = name.replace("alpha_v", "alpha_u")
+        if along in found and flat[along] == value:
+            found[name] = found[along]
+        else:
+            found[name] = tuple(numbers[key]() for _ in value) if isinstance(value, tuple) else numbers[key]()
+    return stack.replace(**found)
+
+
 class _Tame:
     """Values as users give them, the special ones among them."""
 
