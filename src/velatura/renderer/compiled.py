@@ -23,7 +23,6 @@ from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.sparse import csc_array
 
 from velatura import kernel
 from velatura.ops import Value
@@ -146,6 +145,8 @@ def _rows(each: Sequence[Array], width: int) -> Array:
 
 def _deposited(light: Deposit, shape: tuple[int, int], rows: int) -> Array:
     """Light that falls on rows, samples being columns of a sparse matrix."""
+    from scipy.sparse import csc_array  # slow to load
+
     shares, values, waves = (
         np.stack(np.broadcast_arrays(*each, np.empty(shape))[:-1], axis=-1)
         for each in (light.shares, _channels(light.values), light.waves)

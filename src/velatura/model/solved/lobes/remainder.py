@@ -18,7 +18,6 @@ from math import pi
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.linalg import block_diag
 
 from velatura import ops
 from velatura.model.solved.energies.nodes import QUADRATURE, Nodes
@@ -193,6 +192,8 @@ def _solved(parts: Sequence[tuple[Array, Array]], columns: Sequence[Sequence[Arr
     negative: those that would be are left out."""
     kept = list(range(len(columns)))
     while kept:
+        from scipy.linalg import block_diag  # slow to load
+
         rows = block_diag(*(rows for rows, _ in parts))
         shared = np.stack([np.concatenate(columns[k]) for k in kept], axis=-1)
         target = np.concatenate([target for _, target in parts])
