@@ -35,7 +35,7 @@ class Address:
     declared: Scalar
     parts: tuple[int, ...] = ()
 
-    @property
+    @functools.cached_property
     def name(self) -> str:
         """The flat name."""
         return prefix(self.parts) + (self.key if self.layer is None else f"layer{self.layer}_{self.key}")

@@ -58,7 +58,11 @@ class Material:
     @classmethod
     def from_flat(cls, like: Stack | Material, values: Mapping[str, Value], light: Value = "srgb") -> Material:
         """Values by flat name, as `Stack.flat` has them, of layers of the same kinds as others."""
-        exterior, *others = (values[address.name] for address in addresses(like.kinds, like.films))
+        return cls._like(like, [values[address.name] for address in addresses(like.kinds, like.films)], light)
+
+    @classmethod
+    def _like(cls, like: Stack | Material, values: Sequence[Value], light: Value) -> Material:
+        exterior, *others = values
         each, layers = iter(others), []
         for kind, films, phase in zip(like.kinds, like.films, like.phases):
             own: dict[str, Any] = {address.key: next(each) for address in addresses((kind,))[1:]}
@@ -81,8 +85,8 @@ class Material:
 
     def each(self, change: Callable[[Address, Value], Value]) -> Material:
         """The material with every value changed."""
-        changed = {address.name: change(address, value) for address, value in self.values()}
-        return self.from_flat(self, changed, self.light).coated(self.coatings).of_metals(self.measured)
+        changed = [change(address, value) for address, value in self.values()]
+        return self._like(self, changed, self.light).coated(self.coatings).of_metals(self.measured)
 
     def coated(self, coatings: Sequence[Any]) -> Material:
         """The material with films on its layers as a renderer has them, None for those without."""

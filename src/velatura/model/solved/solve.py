@@ -621,7 +621,8 @@ class Solver:
 def solve(material: Material, model: Model, variance: type[Variance], context: Context) -> Solved:
     """The BSDF of a material with constants of a renderer; differentiable."""
     material = material.solid()
-    start, given = plain(material), Variables.of(material)
+    given = Variables.of(material)
+    start = given.start
     solver = Solver.of(model, variance, context, start)
     layouts = solver.layouts([start, *given.ends(start)])
     solver = solver.own([start], layouts)
