@@ -29,16 +29,16 @@ MATT = vt.Stack([vt.Medium(sigma_s=(4.0, 2.0, 1.0), sigma_a=0.2, g=0.5), vt.Diff
 
 @pytest.fixture(scope="module")
 def stage() -> Iterator[viewport.Stage]:
-    with viewport.stage(32, 32) as opened:
+    with viewport.stage(16, 16) as opened:
         yield opened
 
 
 @pytest.mark.parametrize(
     ("material", "scene", "size", "samples", "spp"),
     [
-        (BRUSHED, "ball", 32, 512, 1024),
+        (BRUSHED, "ball", 16, 768, 1536),
         (vt.preset("frosted-glass"), "sphere", 4, 24576, 24576),
-        (MATT, "ball", 32, 512, 2048),
+        (MATT, "ball", 16, 512, 2048),
     ],
     ids=["brushed", "frosted", "matt"],
 )

@@ -5,12 +5,10 @@ Rationale: only there are they fetched from the folder, laid on the object and r
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 import pytest
 import viewport
-from editor import Server, Visit
+from editor import Server, Tabs
 from matplotlib.image import imsave
 
 import velatura as vt
@@ -34,13 +32,13 @@ layers:
 
 @pytest.mark.parametrize("text", [TEXTURED, FILMED])
 def test_images_lie_on_the_object_as_in_mitsuba(
-    text: str, opened: Any, served: Server, monkeypatch: pytest.MonkeyPatch
+    text: str, tabs: Tabs, served: Server, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Expected: within .01 of white, values from a picture that the page fetches from the folder."""
     spots = np.random.default_rng(3).integers(0, 256, (4, 8, 3))
     imsave(served.folder / "spots.png", np.kron(spots, np.ones((4, 4, 1))).astype(np.uint8))
     (served.folder / "spots.yaml").write_text(text)
-    visit = Visit(opened.new_context(viewport={"width": 900, "height": 600}).new_page(), served.entrance)
+    visit = tabs.visit(served.entrance)
     page = visit.page
     page.get_by_label("Object", exact=True).select_option("sphere")
     page.get_by_label("Light", exact=True).select_option("studio")
@@ -51,8 +49,8 @@ def test_images_lie_on_the_object_as_in_mitsuba(
     stage = viewport.Stage(page, visit.complaints)
     stage.resize(16, 16)
     monkeypatch.chdir(served.folder)
-    found = viewport.compared(stage, vt.load("spots.yaml"), "sphere", "studio", 768, 1536, "belcour2018")
-    page.context.close()
+    found = viewport.compared(stage, vt.load("spots.yaml"), "sphere", "studio", 512, 1152, "belcour2018")
+    tabs.forget()
     assert found.noise < BOUND / 3
     assert found.noise_of_truth < BOUND / 3
     assert found.difference < BOUND
