@@ -193,3 +193,21 @@ def test_a_wish_far_beyond_what_is_possible_is_approached_by_a_part_of_it() -> N
     assert found.part > 0.7
     for k in range(2):
         assert found.reached.lobes[k].colour == pytest.approx(now.lobes[k].colour, rel=1e-3)
+
+
+def test_a_wish_that_a_part_of_it_leads_to_is_met() -> None:
+    """By the default model, a coat whose energy is to be two thirds more, over a pair and a metal. The search from the
+    present stack leads nowhere, and from half of the way it leads to all of it. Expected: the model reads the wish."""
+    model = named("velatura")
+    metal = vt.Interface(eta=(0.942, 0.709, 0.709), k=(1.124, 0.709, 0.709), alpha=0.4216)
+    coats = [vt.Interface(eta=1.1446, alpha=0.1403), vt.Interface(eta=1.6555, alpha=0.3565)]
+    tinted = [vt.Medium(sigma_a=(0.0221, 0.0, 0.0365)), vt.Interface(eta=1.0026, alpha=0.205)]
+    stack = Stack([*coats, *tinted, vt.Medium(sigma_a=(0.0, 0.1329, 0.5226)), metal])
+    form = [{"energy": 0.1}, {"energy": 0.1, "interfaces": 2}, {"energy": 0.1, "base": "conductor"}]
+    now = seen(stack, Target(form), model)
+    wish = now.with_energy(0, (0.00764,) * 3)
+    found = answer(stack, wish, model)
+    assert found.met
+    for lobe, own in zip(wish.lobes, seen(found.stack.stack, wish, model).lobes):
+        assert own.colour == pytest.approx(lobe.colour, abs=1e-5)
+        assert own.roughness == pytest.approx(lobe.roughness, abs=1e-4)

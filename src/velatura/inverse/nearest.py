@@ -29,7 +29,7 @@ ON_LINE, QUICKLY_ON_LINE = 1e-3, 2e-2  # what an answer may miss the line by
 SAME = 1e-5  # difference of roughnesses of a blur that stays
 CLOSE = 0.05  # part of the way from which a wish is met by itself
 UNLIKE = 1e-3  # energy or variance by which a stack differs from the nearest that can be dragged, and is taken itself
-HALVINGS = 6, 3  # of the way that is left, where other searches are looked at, at rest and under the hand
+HALVINGS = 6  # of the way that is left, where other searches are looked at
 DIMMED = 0.7  # share of the energy of a lobe that it has in any case if it is blurred more
 LEAST = 1e-3  # part of the way that is no change
 ROUNDED = 1e-3  # share of an energy by which a wish may be off, that is not worth a word
@@ -157,25 +157,30 @@ def _along(
 
 def _further(
     present: DraggedStack, now: Target, wish: Target, found: DraggedStack, bound: Bound, part: float, quick: bool
-) -> tuple[DraggedStack, Bound, float]:
+) -> tuple[DraggedStack, Bound | None, float]:
     """The stack that other searches find further on the line, by bisection, the bound there, and the part of the way.
 
     The first search may have ended beside the line: its bound counts only where nothing is looked for from its end. A
-    wish far beyond what is possible may lead a slow model astray, where a part of it does not.
+    wish far beyond what is possible may lead a slow model astray, where a part of it does not. So the whole wish is
+    looked for again from the first part that is found.
     """
     here, goal = _readings(present, now, now), _readings(present, now, wish)
-    end = 1.0
-    for _ in range(HALVINGS[quick]):
-        middle = (part + end) / 2
+    end, middle, again = 1.0, (part + 1) / 2, True
+    for _ in range(HALVINGS):
         asked = present.space.target_of(here + middle * (goal - here), wish)
         stack, stopped, *_ = _along(found, found.now(asked), asked, quick)
         other = stack if stopped is None else None
         if stopped is not None and not present.space.slow:
             other = _elsewhere(present, asked, False)
-        if other is not None:
-            found, part = other, middle
-        elif stopped is not None:
+        if other is None:
+            assert stopped is not None
             end, bound = middle, stopped
+        elif middle == 1:
+            return other.renamed(wish), None, 1.0
+        else:
+            found, part = other, middle
+        whole = again and other is not None and end == 1
+        middle, again = (1.0, False) if whole else ((part + end) / 2, again)
     return found.renamed(wish), bound, part
 
 
