@@ -52,8 +52,7 @@ def visit(tabs: Tabs, served: Server) -> Iterator[Callable[..., Visit]]:
     """Opens the page, with the preset coated-gold, in a browser without a past, whose console may not complain."""
     yield lambda: tabs.visit(served.entrance)
     assert unexpected(tabs.forget(), []) == []
-    for file in served.folder.iterdir():
-        file.unlink()
+    served.clear()
 
 
 @pytest.fixture(scope="module")

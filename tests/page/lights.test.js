@@ -3,7 +3,7 @@
 import assert from 'node:assert/strict';
 import { test } from 'node:test';
 
-import { withLights } from '../../src/velatura/editor/page/render/lights.js';
+import { mirrored, withLights } from '../../src/velatura/editor/page/render/lights.js';
 
 const GREY = { width: 4, height: 2, data: new Float32Array(24).fill(0.5) };
 const LIGHT = { azimuth: 90, elevation: 30, size: 40, strength: 8, colour: [1, 0.5, 0] };
@@ -33,4 +33,12 @@ test('lights add up, and without any a picture is as it was', () => {
   const twice = withLights(GREY, [LIGHT, LIGHT]), once = withLights(GREY, [LIGHT]);
   assert.ok(Math.abs(flux(twice, 0, 0.5) - 2 * flux(once, 0, 0.5)) < 1e-4);
   assert.ok(GREY.data.every((value) => value === 0.5));
+});
+
+test('a highlight is placed where the eye is mirrored, in the picture of the light as it is turned', () => {
+  const [slope] = [Math.SQRT1_2];
+  assert.deepEqual(mirrored({ normal: [0, 0, 1], ray: [0, 0, -1] }, 0), { azimuth: 0, elevation: 0 });
+  assert.deepEqual(mirrored({ normal: [slope, 0, slope], ray: [0, 0, -1] }, 0), { azimuth: 90, elevation: 0 });
+  assert.deepEqual(mirrored({ normal: [slope, 0, slope], ray: [0, 0, -1] }, 30), { azimuth: 60, elevation: 0 });
+  assert.equal(mirrored({ normal: [0, 2 * slope, 2 * slope], ray: [0, 0, -1] }, 0).elevation, 90); // of any length
 });

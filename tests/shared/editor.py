@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import re
 import secrets
+import shutil
 import subprocess
 import sys
 from collections.abc import Iterable, Iterator
@@ -45,6 +46,14 @@ class Server:
         found = _ADDRESS.search(line)
         assert found, f"the editor's server says: {line}{self.process.stdout.read()}"
         self.entrance, self.address = found[0], found[1]
+
+    def clear(self) -> None:
+        """Remove all that lies in the folder."""
+        for entry in self.folder.iterdir():
+            if entry.is_dir():
+                shutil.rmtree(entry)
+            else:
+                entry.unlink()
 
     def kill(self) -> None:
         self.process.kill()

@@ -4,6 +4,7 @@ import { render } from 'lit-html';
 import { Offline } from './connection.js';
 import { filesOf } from './dropped.js';
 import { createFiles } from './files.js';
+import { mirrored } from './render/lights.js';
 import { Viewport } from './render/viewport.js';
 import { lookAhead } from './state/ahead.js';
 import * as commands from './state/commands.js';
@@ -15,7 +16,9 @@ import { follow } from './state/picture.js';
 import { createSnapshots } from './state/snapshots.js';
 import { createStore } from './state/store.js';
 import { createStrips } from './state/strips.js';
+import { createSwatches } from './state/swatches.js';
 import { followTruth } from './state/truth.js';
+import { createAim } from './views/aim.js';
 import { mountAppearance } from './views/appearance.js';
 import { chooseFile, offer } from './views/browser.js';
 import { createChoice } from './views/choice.js';
@@ -30,6 +33,8 @@ import { followScrubbing } from './views/scrubbing.js';
 import { followTyping, isTyping } from './views/typing.js';
 
 const KEPT = 250; // milliseconds after a change until it is stored
+const NO_COLOUR = 'There is no colour to take: choose a place where one picture is shown, or the photograph.';
+const NO_HIGHLIGHT = 'There is nothing of the object: choose a place on it, where one picture is shown.';
 const COUNTED = 250; // milliseconds between two looks at the count of samples
 
 /**
@@ -60,7 +65,9 @@ export function mount(root, { call, lacks = nothingLacks, live, session, storage
     ...{ call, fetch, displayed: session.views[0].text },
     onError: (error) => messages.complain('picture', error.message),
   });
-  const edits = createEdits({ store, viewport, messages });
+  const aim = createAim({ element, update });
+  const swatches = createSwatches(storage, update);
+  const edits = createEdits({ store, viewport, messages, colours: { swatches, pick: pickColour } });
   const arrangement = createLayout(storage, update);
   const lobes = createSignal(window);
   const focus = (selector) => element.querySelector(selector)?.focus();
@@ -118,12 +125,13 @@ export function mount(root, { call, lacks = nothingLacks, live, session, storage
   page = createPage({
     ...{ store, session, ...arrangement, edits, messages, picture, canvas, focus, update, lacks, toolbar: toolbar.view },
     choice: choice.view,
+    aim: aim.view,
     layers: createLayers({
       ...{ store, session, ...arrangement, lacks, edits, messages, choose, upload: files.upload, focus, update, viewport, mix: toolbar.mix, give: toolbar.give },
       strips: createStrips({ call, lacks, update }),
     }),
     strip: createStrip({ store, snapshots, focus, update }),
-    view: createView({ store, session, edits, picture, choose, takeEnvironment: files.takeEnvironment }),
+    view: createView({ store, session, edits, picture, choose, placeLight, takeEnvironment: files.takeEnvironment }),
     model: createModel({ store, session, lacks, choose, takePhotograph: files.takePhotograph }),
     onFace: () => appearance.follow(),
   });
@@ -140,6 +148,25 @@ export function mount(root, { call, lacks = nothingLacks, live, session, storage
     if (!page) return;
     render(page.view(), element);
     if (address) document.title = `${store.get().name || 'Material'} - Velatura`;
+  }
+
+  /** The colour of a place of the picture that is asked for, each channel from 0 to 1; null where there is none. */
+  async function pickColour() {
+    const place = await aim.ask('A colour'), rgb = place && viewport.lightAt(place);
+    if (place && !rgb) messages.complain('colour', NO_COLOUR, { passing: true });
+    if (!rgb) return null;
+    const most = Math.max(...rgb);
+    if (most > 1) messages.say('That light is brighter than white: its colour is taken at the brightest.');
+    return rgb.map((channel) => Math.max(channel, 0) / Math.max(most, 1));
+  }
+
+  /** Moves a light to where its highlight is seen at a place of the picture that is asked for. */
+  async function placeLight(number) {
+    const place = await aim.ask(`Light ${number + 1}`), seen = place && viewport.seenAt(place);
+    if (place && !seen) messages.complain('light', NO_HIGHLIGHT, { passing: true });
+    if (!seen) return;
+    const { lights, rotation } = store.get().view;
+    store.run(commands.setView, { lights: lights.with(number, { ...lights[number], ...mirrored(seen, rotation) }) });
   }
 
   function conflict(file) {

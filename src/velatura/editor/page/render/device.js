@@ -139,13 +139,13 @@ export class Device {
     gl.clearBufferfv(gl.COLOR, 0, Array(4).fill(value));
   }
 
-  /** The pixels of a target, from its lower row on. */
-  read({ handle, width, height }) {
+  /** The pixels of a target, or of a `part` {x, y, width, height} of it, from its lower row on. */
+  read({ handle, width: columns, height: rows }, { x, y, width, height } = { x: 0, y: 0, width: columns, height: rows }) {
     const { gl } = this;
     const pixels = new Float32Array(4 * width * height);
     gl.bindFramebuffer(gl.FRAMEBUFFER, handle);
     gl.readBuffer(gl.COLOR_ATTACHMENT0);
-    gl.readPixels(0, 0, width, height, gl.RGBA, gl.FLOAT, pixels);
+    gl.readPixels(x, y, width, height, gl.RGBA, gl.FLOAT, pixels);
     return pixels;
   }
 

@@ -27,6 +27,18 @@ export function withLights(picture, lights) {
   return { width, height, data };
 }
 
+/**
+ * Where a light is that is mirrored to the eye: its azimuth and elevation, where the light all around is turned by `rotation`
+ * degrees; `ray` goes from the eye to a surface of a `normal`.
+ */
+export function mirrored({ normal, ray }, rotation) {
+  const along = 2 * ray.reduce((sum, x, k) => sum + x * normal[k], 0), length = Math.hypot(...normal) ** 2;
+  const [x, y, z] = ray.map((own, k) => own - (along / length) * normal[k]), turn = radians(rotation);
+  const [across, ahead] = [Math.cos(turn) * x - Math.sin(turn) * z, Math.sin(turn) * x + Math.cos(turn) * z];
+  const degrees = (angle) => Math.round((1800 * angle) / Math.PI) / 10;
+  return { azimuth: degrees(Math.atan2(across, ahead)), elevation: degrees(Math.asin(Math.min(Math.max(y, -1), 1))) };
+}
+
 const radians = (degrees) => (degrees * Math.PI) / 180;
 
 const direction = (azimuth, elevation) => [

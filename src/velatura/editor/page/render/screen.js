@@ -1,9 +1,11 @@
 // The canvas: one picture or several, each a preview, a sum of paths or in between; and the truth in the place of one.
 
+import { decoded } from '../state/colours.js';
 import { blending, display, metering } from './glsl/display.glsl.js';
 
 const FIRST = 4; // samples from which on they are shown
 const PARTS = [16, 9]; // of a picture, in which differences are summed
+const AROUND = 2; // pixels to each side whose light is averaged
 const TRUSTED = 16; // samples from which on the preview shows through no more
 
 const PLAIN = { split: 1, difference: false, photographed: false, corner: [0, 0] }; // one picture that fills its target
@@ -40,7 +42,7 @@ export class Screen {
   setTruth(truth, { width, height }) {
     this.#device.free(this.truth?.texture);
     const texels = truth?.data && stretched(truth, width, height);
-    this.truth = truth && { ...truth, texture: texels && this.#device.texture('RGBA32F', width, height, texels) };
+    this.truth = truth && { ...truth, texels, texture: texels && this.#device.texture('RGBA32F', width, height, texels) };
   }
 
   /** Takes a photograph, an ImageBitmap, which lies in the middle of a size as large as it has room; or null. */
@@ -78,6 +80,19 @@ export class Screen {
     return total(0) / total(1);
   }
 
+  /**
+   * The mean linear light of a few pixels around one of a slot, or on the right of what is in its place: of a photograph as it is,
+   * else exposed. Null beside a photograph.
+   */
+  lightAt(slot, { x, y, isRight, exposure }) {
+    const target = slot.samples < FIRST ? slot.preview : slot.sum, { width, height } = target;
+    const [left, below] = [Math.max(x - AROUND, 0), Math.max(y - AROUND, 0)];
+    const part = { x: left, y: below, width: Math.min(2 * AROUND + 1, width - left), height: Math.min(2 * AROUND + 1, height - below) };
+    if (isRight && this.photograph) return meanOf(linear(fitted(this.photograph.image, width, height), part), 1);
+    if (isRight && this.truth?.texels) return meanOf(within(this.truth.texels, width, part), 2 ** exposure);
+    return meanOf(this.#device.read(target, part), 2 ** exposure);
+  }
+
   #pictures(slots) {
     const [a, b = a] = slots.map((slot) => this.#textureOf(slot));
     return [a, this.photograph?.texture ?? this.truth?.texture ?? b];
@@ -96,6 +111,24 @@ export class Screen {
     this.#device.draw(this.#blending, { picture: preview, sum, trust }, slot.spare);
     return slot.spare.textures[0];
   }
+}
+
+/** The mean of colours by their weights in A, times a factor; null where they have none. */
+function meanOf(texels, factor) {
+  const total = (channel) => texels.reduce((sum, x, index) => sum + (index % 4 === channel ? x : 0), 0);
+  return total(3) > 0 ? [0, 1, 2].map((channel) => (factor * total(channel)) / total(3)) : null;
+}
+
+/** A part of texels in rows of a width. */
+function within(texels, width, part) {
+  const row = (_, k) => [...texels.subarray(4 * ((part.y + k) * width + part.x), 4 * ((part.y + k) * width + part.x + part.width))];
+  return Array.from({ length: part.height }, row).flat();
+}
+
+/** The linear light of the bytes of a part of a canvas, times their opacity, and that. */
+function linear(canvas, { x, y, width, height }) {
+  const { data } = canvas.getContext('2d').getImageData(x, y, width, height);
+  return Array.from(data, (byte, k) => (data[k | 3] / 255) * (k % 4 === 3 ? 1 : decoded(byte / 255)));
 }
 
 /** A canvas with an image in its middle, from the lower row on. */

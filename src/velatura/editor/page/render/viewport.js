@@ -285,6 +285,17 @@ export class Viewport {
     return found && { name: this.names[found.part], normal: found.normal, ray: rayOf(uniforms, x + 0.5, y + 0.5).toArray() };
   }
 
+  /**
+   * The linear light of a place of the canvas on the page, exposed, the mean of a few pixels; of a photograph that of its bytes. Null
+   * where there is none, of a difference, and beside others.
+   */
+  lightAt(place) {
+    const { mode, split, exposure } = this.settings, [x, y] = this.#pixelOf(place);
+    if (this.lost || mode === 'difference' || this.#names().length > 1) return null;
+    const isRight = mode === 'split' && x + 0.5 >= split * this.frame.width, [a, b = a] = this.#seen();
+    return this.screen.lightAt(isRight ? b : a, { x, y, isRight, exposure });
+  }
+
   /** The pixel at a place of the canvas on the page, from the lower left. */
   #pixelOf({ x, y }) {
     const { width, height, clientWidth, clientHeight } = this.canvas;

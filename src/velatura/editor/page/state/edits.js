@@ -2,8 +2,11 @@
 
 const SETTLED = 400; // milliseconds after which a value that is no longer moved counts as set
 
-/** `{drag, settle, of, stop}` for a store; the viewport draws in fewer pixels while something is dragged. */
-export function createEdits({ store, viewport, messages }) {
+/**
+ * `{drag, settle, of, stop}` for a store; the viewport draws in fewer pixels while something is dragged. `colours` is what controls of
+ * colours offer: `{swatches, pick}`.
+ */
+export function createEdits({ store, viewport, messages, colours = null }) {
   let settling = null;
 
   const edits = {
@@ -28,6 +31,7 @@ export function createEdits({ store, viewport, messages }) {
       move: (value) => edits.drag(key, ...act(value)),
       set: (value) => store.run(...act(value)),
       settle: edits.settle,
+      colours,
       refuse: (text) => messages.complain(about, text, { layer, passing: true }),
     }),
     stop: () => clearTimeout(settling),

@@ -1,10 +1,11 @@
 // State that outlives a page: the history of this tab, the last material of any, the layout, pictures of
-// earlier states, and the files dropped on them.
+// earlier states, colours, and the files dropped on them.
 
 const TAB = 'velatura.tab';
 const LAST = 'velatura.last';
 const LAYOUT = 'velatura.layout';
 const SNAPSHOTS = 'velatura.snapshots';
+const SWATCHES = 'velatura.swatches';
 const FORM = 1; // of what is stored; another one is not read
 
 /** Storage of the browser: a tab has its own history, and a new one begins with the last material of any. */
@@ -24,6 +25,8 @@ export function browserStorage({ sessionStorage, localStorage, indexedDB }) {
     keepLayout: (layout) => write(localStorage, LAYOUT, layout),
     snapshots: () => read(sessionStorage, SNAPSHOTS) ?? [],
     keepSnapshots: (list) => write(sessionStorage, SNAPSHOTS, list),
+    swatches: () => read(localStorage, SWATCHES),
+    keepSwatches: (list) => write(localStorage, SWATCHES, list),
     put: (name, file) => inStore(indexedDB, 'readwrite', (store) => store.put(file, name)),
     get: (name) => inStore(indexedDB, 'readonly', (store) => store.get(name)),
   };
@@ -40,6 +43,8 @@ export function memoryStorage() {
     keepLayout() {},
     snapshots: () => [],
     keepSnapshots() {},
+    swatches: () => null,
+    keepSwatches() {},
     put: async (name, file) => void files.set(name, file),
     get: async (name) => files.get(name),
   };

@@ -1,15 +1,16 @@
 // Controls of colours, linear RGB: swatches, hexadecimal fields, and a slider for each channel or for hue, saturation, value.
 
 import { html, nothing } from 'lit-html';
-import { number, numberField, shown, spanOf } from './controls.js';
+import { decoded, encoded } from '../state/colours.js';
+import { ref } from 'lit-html/directives/ref.js';
+import { iconButton, number, numberField, shown, spanOf, styles } from './controls.js';
+import { icons } from './icons.js';
 import { text } from './typing.js';
 
 const CHANNELS = ['red', 'green', 'blue'];
 const HSV = ['hue', 'saturation', 'value'];
 const CLEAREST = 1e-4; // of what a tint lets through of a channel
 
-const encoded = (c) => (c <= 0.0031308 ? 12.92 * c : 1.055 * c ** (1 / 2.4) - 0.055);
-const decoded = (c) => (c <= 0.04045 ? c / 12.92 : ((c + 0.055) / 1.055) ** 2.4);
 const within = (c) => Math.max(0, Math.min(1, c));
 const rounded = (number) => Number(number.toPrecision(4));
 
@@ -108,8 +109,48 @@ export function picks({ label, rgb, whole = null, edit, beside = nothing }) {
       .value=${text(seen)}
       @change=${written}
     />
+    ${edit.colours ? [eyedropper({ label, worth, edit }), swatches({ label, seen: rgb.map((c) => within(c / (whole ?? 1))), worth, edit })] : nothing}
     ${beside}
   </div>`;
+}
+
+/** A button that takes the colour of a place of the picture. */
+function eyedropper({ label, worth, edit }) {
+  const act = async () => {
+    const rgb = await edit.colours.pick();
+    if (rgb) edit.set(worth(rgb));
+  };
+  const title = 'Take the light of a place of the picture, or of the photograph beside it';
+  return iconButton({ label: `${label}, from the picture`, icon: 'eyedropper', title, act });
+}
+
+/** Colours that are kept, which a button shows; Delete forgets one. */
+function swatches({ label, seen, worth, edit }) {
+  const { list, keep, forget } = edit.colours.swatches;
+  const place = ({ target, newState }) => {
+    if (newState !== 'open') return;
+    const { right, bottom } = target.previousElementSibling.getBoundingClientRect(), { clientWidth } = target.ownerDocument.documentElement;
+    target.style = styles({ right: `${clientWidth - right}px`, top: `${bottom}px` });
+  };
+  const one = (rgb) => html`<button
+    type="button"
+    class="one"
+    aria-label=${`Kept colour ${hex(rgb)}`}
+    title=${`${hex(rgb)}; Delete forgets it`}
+    .style=${styles({ background: hex(rgb) })}
+    @click=${({ target }) => {
+      target.closest('[popover]').hidePopover();
+      edit.set(worth(rgb));
+    }}
+    @keydown=${({ key }) => key === 'Delete' && forget(rgb)}
+  ></button>`;
+  const opens = (button) => button && (button.popoverTargetElement = button.nextElementSibling);
+  return html`<button type="button" class="small" aria-label=${`${label}, kept colours`} title="Colours that are kept" ${ref(opens)}>
+      ${icons.swatches}</button
+    ><div class="swatches" popover @beforetoggle=${place}>
+      <button type="button" @click=${() => keep(seen.map(rounded))}>Keep this colour</button>
+      ${list.map(one)}
+    </div>`;
 }
 
 /** `edit` for one entry of a list. */

@@ -14,7 +14,7 @@ import { titleOf } from './strip.js';
 /**
  * The whole page: `view()`, and `show(face)`, which turns the panel to the layers or to their appearance.
  *
- * @param {object} parts views `toolbar`, `choice`, `layers`, `strip`, `view` and `model` of what is in it, its `canvas`, and what it works on;
+ * @param {object} parts views `toolbar`, `choice`, `layers`, `strip`, `aim`, `view` and `model` of what is in it, its `canvas`, and what it works on;
  *   `onFace()` is called after the panel has turned
  */
 export function createPage({ store, session, layout, arrange, edits, messages, picture, canvas, focus, update, lacks, onFace, ...parts }) {
@@ -30,7 +30,7 @@ export function createPage({ store, session, layout, arrange, edits, messages, p
     ${parts.toolbar()}
     <main class="stage" .style=${styles({ '--look': pixels(layout.lookHeight) })}>
       <div class="picture">
-        ${canvas} ${compared({ store, session, edits, picture })}
+        ${canvas} ${parts.aim()} ${compared({ store, session, edits, picture })}
         <span class="samples" aria-hidden="true"></span>
         ${picture.shader('a')?.closed_form ? closedForm : nothing}
         ${bubbles(messages)}

@@ -35,7 +35,7 @@ const choice = (label, value, options, choose) => line(label, menu({ label, valu
 /** A view of what the picture shows. */
 export const createView = (services) => () => view(services);
 
-function view({ store, session, edits, picture, choose, takeEnvironment }) {
+function view({ store, session, edits, picture, choose, placeLight, takeEnvironment }) {
   const { view } = store.get(), { lights = [] } = view;
   const setLights = (next) => store.run(setView, { lights: next });
   const change = (key) => edits.of(`view.${key}`, (value) => [setView, { [key]: value }], 'view');
@@ -56,7 +56,7 @@ function view({ store, session, edits, picture, choose, takeEnvironment }) {
   return html`
     ${choice('Object', view.object, withOwn(objects, view.object), chooseObject)}
     ${choice('Light', view.environment, withOwn(known, view.environment), change('environment').set)}
-    ${lights.map((_, number) => light({ lights, number, edits, remove: () => setLights(lights.toSpliced(number, 1)) }))}
+    ${lights.map((_, number) => light({ lights, number, edits, place: () => placeLight(number), remove: () => setLights(lights.toSpliced(number, 1)) }))}
     ${line('Light turned', dial({ label: 'Rotation of the light', value: view.rotation, spec: TURN, edit: change('rotation') }))}
     ${line('Exposure', number({ ...exposure, value: view.exposure, edit: change('exposure') }))}
     ${line(
@@ -77,8 +77,8 @@ function view({ store, session, edits, picture, choose, takeEnvironment }) {
   `;
 }
 
-/** One light of one's own: its colour and strength, where it is, and a button that takes it away. */
-function light({ lights, number, edits, remove }) {
+/** One light of one's own: its colour and strength, where it is, and buttons that place it by its highlight, and take it away. */
+function light({ lights, number, edits, place, remove }) {
   const name = `Light ${number + 1}`, value = lights[number];
   const part = (key) => edits.of(`view.lights.${number}.${key}`, (next) => [setView, { lights: lights.with(number, { ...value, [key]: next }) }], 'view');
   const field = ([key, { step, ...spec }]) => html`<label
@@ -87,7 +87,10 @@ function light({ lights, number, edits, remove }) {
   return html`<div class="parameter light">
     <span class="name">${name}</span>
     <div class="control">${picks({ label: name, rgb: value.colour, edit: part('colour') })}</div>
-    <div class="extras">${iconButton({ label: `Remove ${name}`, icon: 'remove', act: remove })}</div>
+    <div class="extras">
+      ${iconButton({ label: `Place the highlight of ${name}`, icon: 'aim', title: 'Moves the light to where it is mirrored at a place of the picture', act: place })}
+      ${iconButton({ label: `Remove ${name}`, icon: 'remove', act: remove })}
+    </div>
     <div class="pairs">${Object.entries(LIGHT).map(field)}</div>
   </div>`;
 }
