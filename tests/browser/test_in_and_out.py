@@ -19,6 +19,7 @@ from editor import Server, Tabs, Visit, unexpected
 from matplotlib.image import imsave
 
 import velatura as vt
+from velatura.editor import library
 
 pytestmark = pytest.mark.skipif(bool(chromium.missing()), reason=chromium.missing())
 
@@ -72,8 +73,7 @@ def visit(tabs: Tabs, served: Server) -> Iterator[Open]:
 
     yield begin
     complaints = unexpected(tabs.forget(), expected)
-    for file in served.folder.iterdir():
-        file.unlink()
+    served.clear()
     assert complaints == []
 
 
@@ -147,7 +147,7 @@ def test_a_file_of_the_folder_is_opened_with_its_image_and_one_is_mixed_in(visit
     page.settled()
 
     page.page.get_by_role("button", name="Mix with", exact=False).click()
-    page.page.get_by_role("button", name="gilt.xml").click()
+    page.page.get_by_role("button", name="gilt.xml", exact=True).click()
     said(page, "Mixed with Gilt")
 
     page.page.get_by_role("button", name="Open", exact=True).click()
@@ -269,6 +269,34 @@ def test_files_of_the_folder_are_renamed_removed_and_put_back(visit: Open, serve
     button(page, "copper.yaml").wait_for()
     assert (served.folder / "copper.yaml").read_text() == "layers: [{interface: {conductor: Au}}]\n"
     (served.folder / ".velatura-removed").rmdir()
+
+
+def test_files_of_the_folder_have_pictures_and_are_found_by_tags(visit: Open, served: Server) -> None:
+    """Expected: a file that was saved has a picture of what was seen, and tags by keys alone, by which it is found."""
+    page = visit()
+    (served.folder / "copper.yaml").write_text("layers: [{interface: {conductor: Cu}}]\n")
+    button(page, "Save as").click()
+    page.page.get_by_label("File name").fill("gold.yaml")
+    page.page.locator("dialog.save").get_by_role("button", name="Save").click()
+    kept = served.folder / library.FOLDER / "gold.yaml.json"
+    while not kept.is_file():
+        page.page.wait_for_timeout(100)
+    button(page, "Open").click()
+    button(page, "Tags of gold.yaml").press("Enter")
+    page.page.keyboard.type("Warm, brushed ")
+    page.page.keyboard.press("Enter")
+    button(page, "Warm").press("Enter")
+    button(page, "copper.yaml").wait_for(state="detached")
+    picture = button(page, "gold.yaml").locator("img")
+    assert picture.evaluate("image => image.decode().then(() => image.naturalWidth)") == 144
+    assert json.loads(kept.read_text())["tags"] == ["Warm", "brushed"]
+    button(page, "Warm").press("Enter")
+    button(page, "copper.yaml").wait_for()
+    button(page, "Tags of gold.yaml").click()
+    page.page.keyboard.press("Control+a")
+    page.page.keyboard.press("Delete")
+    page.page.keyboard.press("Enter")
+    button(page, "Warm").wait_for(state="detached")
 
 
 # Light ---------------------------------------------------------------------------------------------------------------

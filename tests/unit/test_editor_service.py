@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 from velatura import lobes, tables
-from velatura.editor import bundle, shading
+from velatura.editor import bundle, library, shading
 from velatura.editor.folder import Conflict, Folder
 from velatura.editor.messages import admitted, document, material_of
 from velatura.editor.service import VERBS
@@ -416,7 +416,7 @@ def test_mistakes_are_reported_in_one_line(verb: str, body: dict[str, Any], reas
 def test_a_material_is_saved_and_opened_again(here: Path) -> None:
     verbs = Folder().verbs
     saved = verbs["save"]({"file": "coat.yaml", "material": COAT, "version": None})
-    assert verbs["list"]({}) == {"files": ["coat.yaml"], "textures": []}
+    assert verbs["list"]({}) == {"files": ["coat.yaml"], "textures": [], "kept": {}}
     opened = verbs["open"]({"file": "coat.yaml"})
     assert opened == {"material": COAT, "version": saved["version"]}
     verbs["save"]({"file": "coat.json", "material": COAT, "version": None})
@@ -450,6 +450,46 @@ def test_of_two_that_save_the_second_is_told() -> None:
     Path("coat.yaml").unlink()
     with pytest.raises(Conflict, match="been removed"):
         verbs["save"]({"file": "coat.yaml", "material": COAT, "version": version})
+
+
+def test_what_the_library_keeps_follows_its_file(here: Path) -> None:
+    """Expected: through a rename, a removal and back; others' files that are no such thing are nothing kept."""
+    verbs = Folder().verbs
+    verbs["save"]({"file": "coat.yaml", "material": COAT})
+    with pytest.raises(InvalidInput, match="there is no such file"):
+        verbs["keep"]({"file": "other.yaml", "tags": ["warm"]})
+    assert verbs["keep"]({"file": "coat.yaml", "tags": ["warm", "red", "warm"]}) == {"tags": ["warm", "red"]}
+    both = {"tags": ["warm", "red"], "thumbnail": library.JPEG + "AA=="}
+    assert verbs["keep"]({"file": "coat.yaml", "thumbnail": both["thumbnail"]}) == both
+    verbs["rename"]({"file": "coat.yaml", "name": "lacquer.yaml"})
+    assert verbs["list"]({})["kept"] == {"lacquer.yaml": both}
+    put = verbs["remove"]({"file": "lacquer.yaml"})["file"]
+    verbs["save"]({"file": "lacquer.yaml", "material": COAT})
+    assert verbs["list"]({})["kept"] == {}
+    verbs["restore"]({"file": put, "name": "back.yaml"})
+    assert verbs["list"]({})["kept"] == {"back.yaml": both}
+    for text in ('{"tags": "warm"}', '{"tags": [1], "more": 2}', "[", "[" * 10**5, '"' + "a" * library.LARGEST + '"'):
+        (here / library.FOLDER / "back.yaml.json").write_text(text)
+        assert verbs["list"]({})["kept"] == {}
+
+
+@pytest.mark.parametrize(
+    "kept",
+    [
+        {"tags": ["a,b"]},
+        {"tags": [""]},
+        {"tags": ["a"] * 17},
+        {"tags": ["\n"]},
+        {"tags": "a"},
+        {"thumbnail": "PHN2Zz4="},
+    ],
+)
+def test_what_the_library_cannot_keep_is_refused(here: Path, kept: dict[str, Any]) -> None:
+    verbs = Folder().verbs
+    verbs["save"]({"file": "coat.yaml", "material": COAT})
+    with pytest.raises(InvalidInput, match=r"^(tags|thumbnail): must be a"):
+        verbs["keep"]({"file": "coat.yaml", **kept})
+    assert not (here / library.FOLDER).exists()
 
 
 @pytest.mark.parametrize(

@@ -14,6 +14,7 @@ from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 
 from velatura import imports
+from velatura.editor import library
 from velatura.editor.messages import TEXT, Answer, Body, Verb, admitting, document, field, to_write
 from velatura.errors import InvalidInput
 from velatura.files import reason, whole
@@ -46,7 +47,7 @@ class Folder:
         """Every verb by the name that the page calls it by."""
         verbs = {"list": self.listed, "open": self.opened, "save": self.saved}
         verbs |= {"import": self.imported, "texture": self.texture}
-        verbs |= {"rename": self.renamed, "remove": self.removed, "restore": self.restored}
+        verbs |= {"rename": self.renamed, "remove": self.removed, "restore": self.restored, "keep": self.kept}
         return {name: admitting(verb) for name, verb in verbs.items()}
 
     def first(self, material: str) -> Answer:
@@ -63,10 +64,12 @@ class Folder:
     # Verbs -----------------------------------------------------------------------------------------------------------
 
     def listed(self, body: Body) -> Answer:
-        """The files that can be opened."""
+        """The files that can be opened, and what is `kept` of materials by their names."""
         names = sorted(os.listdir(self.path))
         kinds = {"files": (*MATERIALS, *FOREIGN), "textures": PICTURES}
-        return {kind: [name for name in names if self._readable(name, endings)] for kind, endings in kinds.items()}
+        found = {kind: [name for name in names if self._readable(name, endings)] for kind, endings in kinds.items()}
+        kept = {name: library.kept(self.path, name) for name in found["files"]}
+        return {**found, "kept": {name: each for name, each in kept.items() if each}}
 
     def opened(self, body: Body) -> Answer:
         """The material of a file, and the version that the file has now."""
@@ -113,6 +116,7 @@ class Folder:
         target = self.place(field(body, "name", str), (path.suffix,))
         with self.writing:
             _move(path, target)
+            library.move(self.path, path.name, target.name)
         return {"file": target.name}
 
     def removed(self, body: Body) -> Answer:
@@ -122,6 +126,7 @@ class Folder:
             (self.path / REMOVED).mkdir(exist_ok=True)
             target = self.free(self.path / REMOVED / path.name)
             _move(path, target)
+            library.move(self.path, path.name, f"{REMOVED}-{target.name}")
         return {"file": target.name}
 
     def restored(self, body: Body) -> Answer:
@@ -130,7 +135,15 @@ class Folder:
         target = self.place(field(body, "name", str), MATERIALS)
         with self.writing:
             _move(self.path / REMOVED / put, target)
+            library.move(self.path, f"{REMOVED}-{put}", target.name)
         return {"file": target.name}
+
+    def kept(self, body: Body) -> Answer:
+        """Keep the `tags` or the `thumbnail` of a file, in the folder of the library; the answer is what is kept."""
+        name = self.existing(field(body, "file", str), (*MATERIALS, *FOREIGN)).name
+        with self.writing:
+            library.keep(self.path, name, **{key: body[key] for key in library.KEYS if key in body})
+            return library.kept(self.path, name)
 
     def texture(self, body: Body) -> Answer:
         """Put a picture into the folder, under a name that is free, or is this very picture's already."""

@@ -18,6 +18,7 @@ from typing import Any, ClassVar, TypeAlias
 import numpy as np
 from numpy.typing import ArrayLike
 
+from velatura.editor import library
 from velatura.editor.arrays import Picture, Triangles
 from velatura.errors import InvalidInput
 from velatura.inverse.wishes import Available
@@ -230,6 +231,7 @@ KEYS: dict[str, Parameter] = {
     "text": Words("of a material file", most=TEXT),
     "file": Words("of the folder"),
     "version": Words("of a file"),
+    **library.KEYS,
     "data": Words("of a file, in base64", most=2**26),
     "object": Words("that is seen"),
     "mesh": Triangles("in the place of a named object"),

@@ -70,6 +70,7 @@ BODIES: dict[str, dict[str, Any]] = {
     "truth": {**SHOT, "spp": 1, "seed": 1},
     "render": {**SHOT, **MODEL, "samples": 1, "key": "a", "step": 0, "file": "picture.png", "transparent": True},
     "rename": {"file": "coat.yaml", "name": "coat.yml"},
+    "keep": {"file": "coat.yaml", "tags": ["warm"], "thumbnail": "/9j/AA=="},
     "remove": {"file": "coat.yaml"},
     "restore": {"file": "coat.yaml", "name": "again.yaml"},
     "validation": {"name": "reflection", "parameters": {"alpha_1": 0.2, "angle": 30}},

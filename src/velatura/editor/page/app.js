@@ -220,6 +220,7 @@ export function mount(root, { call, lacks = nothingLacks, live, session, storage
     showSamples(element, viewport, picture.stage);
     showDifference(element, viewport);
     snapshots.look();
+    toolbar.look(snapshots.current()?.picture);
   }, COUNTED);
 
   return {

@@ -22,5 +22,6 @@ export const icons = {
   eyedropper: path('M9 4.5l2.5 2.5M3 13l.6-2.6L10 4l2 2-6.4 6.4zM11 3a1.4 1.4 0 0 1 2 2l-1 1'),
   swatches: path('M2.5 2.5h5v5h-5zM8.5 2.5h5v5h-5zM2.5 8.5h5v5h-5zM8.5 8.5h5v5h-5z'),
   aim: path('M8 1.5v4M8 10.5v4M1.5 8h4M10.5 8h4M8 5a3 3 0 1 0 .01 0'),
+  tag: path('M2.5 2.5h5l6 6-5 5-6-6zM5.5 5.5h.01'),
   texture: path('M2.5 3h11v10h-11zM2.5 11l3.5-4 3 3 1.5-1.5 3 3M10.5 6h.01'),
 };

@@ -12,7 +12,10 @@ import { createRendering } from './rendering.js';
 
 const OPENING = { label: 'Open a material' };
 
-/** `view()`, `saveAs()` and `saveAgain()` as its buttons do, `mix()`, which chooses what the material is mixed with, and `give(name)`, what a part of the object is made of. */
+/**
+ * `view()`, `saveAs()` and `saveAgain()` as its buttons do, `mix()`, which chooses what the material is mixed with, `give(name)`, what a part of the object is made of,
+ * and `look(picture)`, which keeps a picture of the file that is open.
+ */
 export function createToolbar(services) {
   const { store, files } = services;
   const dialogs = { open: createRef(), save: createRef() };
@@ -33,7 +36,7 @@ export function createToolbar(services) {
   };
   const mix = () => openDialog(bar, { label: 'Mix with a material', take: files.mix });
   const give = (name) => openDialog(bar, { label: `Material of ${name}`, take: (material, place) => files.cover(name, material, place) });
-  return { view: () => toolbar(bar), saveAs: bar.saveAs, saveAgain: bar.saveAgain, mix, give };
+  return { view: () => toolbar(bar), saveAs: bar.saveAs, saveAgain: bar.saveAgain, mix, give, look: bar.library.look };
 }
 
 function toolbar(bar) {
@@ -100,8 +103,8 @@ function openPanel(bar) {
     const file = await bar.choose(['.yaml', '.yml', '.json', ...(bar.lacks('import') ? [] : FOREIGN)].join());
     if (file) bar.files.readChosen(file, take);
   };
-  const seek = ({ target }) => {
-    bar.sought = target.value;
+  const seek = (text) => {
+    bar.sought = text;
     bar.update();
   };
   const first = (event) => {
@@ -129,7 +132,7 @@ function openPanel(bar) {
   };
   return html`<dialog class="open" aria-label=${label} ${ref(bar.dialogs.open)}>
     <div class="head">
-      <input type="search" aria-label="Search" placeholder="Search" .value=${live(bar.sought)} @input=${seek} @keydown=${first} />
+      <input type="search" aria-label="Search" placeholder="Search" .value=${live(bar.sought)} @input=${({ target }) => seek(target.value)} @keydown=${first} />
       ${
         opening
           ? nothing
@@ -139,7 +142,7 @@ function openPanel(bar) {
       <button type="button" @click=${close}>Cancel</button>
     </div>
     ${groups.map((name) => some(name, byTitle(presets.filter(({ group }) => group === name))))}
-    ${bar.library.view(sought, (file) => close() || bar.files.openFile(file, take))}
+    ${bar.library.view(sought, seek, (file) => close() || bar.files.openFile(file, take))}
     ${!opening ? nothing : some('From the papers', targets, html`<p>${bar.lacks('targets') || 'On their way.'}</p>`)}
   </dialog>`;
 }
