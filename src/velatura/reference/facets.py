@@ -1,7 +1,8 @@
 """Many scattering events between the facets of one rough interface (Heitz et al. 2016).
 
-Functions alike those of `events`, with `rng` for random numbers, which they return advanced. Densities of many events
-are unknown; those of single ones, on top of a small constant, serve to weigh strategies.
+Functions alike those of `events`, with `rng` for random numbers, which they return advanced. Light that has met one
+facet and light that has met more are weighed apart: the first by the densities of single events, on top of a small
+constant; the second, whose densities are unknown, by one number of their order.
 """
 
 from __future__ import annotations
@@ -20,9 +21,11 @@ from velatura.reference.events import ScatteringEvent, SurfaceMeeting
 from velatura.reference.metal import mean
 
 _MOST_EVENTS = 1000
-_FLOOR = 0.02  # density, per steradian
+_FLOOR = 1e-3  # density of single events at least, per steradian
+_MANY = 2.0  # density that stands for that of several events
 
 Target = tuple[Direction, Value]  # and whether it lies on the side of reflection
+Evaluated = tuple[ScatteringEvent, ...]  # events that add up
 
 
 @dataclass
@@ -46,8 +49,8 @@ class Flight:
 
 def scatter(
     types: Any, meeting: SurfaceMeeting, carried: Value, rng: Any, active: Value, targets: Sequence[Target]
-) -> tuple[ScatteringEvent, list[ScatteringEvent], Any]:
-    """Scatter until the light leaves the interface; also the values for the directions `targets`.
+) -> tuple[ScatteringEvent, list[Evaluated], Any]:
+    """Scatter until the light leaves the interface; also what goes into the directions `targets`.
 
     The value of the first facet is its mean over all heights, that of later ones an estimate.
     """
@@ -61,15 +64,15 @@ def scatter(
     # Scatter between the facets elsewhere
     flight = _fly(types, meeting, carried, rng, active & rough, [surface.into(w) for w, _ in targets])
     wo = surface.out_of(ops.select_record(flight.outside, flight.w, _reverse(flight.w)))
-    many = _weighed(events.evaluate(meeting, wo, flight.outside), flight.weight)
+    many = _weighed(events.evaluate(meeting, wo, flight.outside), flight.weight, flight.count > 1)
     if flight.light is not None:
         many = replace(
             many, light=ops.select_record(flight.outside, flight.light, flight.light.inverted).seen_by(surface.out_of)
         )
-    values = [
-        ops.select_record(rough, _weighed(event, event.weight * _unmasked(meeting, *target) + later), event)
-        for target, event, later in zip(targets, towards, flight.values)
-    ]
+    values = []
+    for target, event, later in zip(targets, towards, flight.values):
+        first = _weighed(event, event.weight * _unmasked(meeting, *target), False)
+        values.append((ops.select_record(rough, first, event), _weighed(event, later, True)))
     return ops.select_record(rough, many, once), values, flight.rng
 
 
@@ -91,7 +94,7 @@ def sample_refraction(types: Any, meeting: SurfaceMeeting, rng: Any) -> tuple[Sc
     densities = events.evaluate(back, (i[0], i[1], -i[2]), False)
     onward = densities.density_back
     turned = replace(densities, wo=wo, density=onward, density_back=densities.density, certain=onward)
-    many = _weighed(turned, ops.select(through, flight.weight, 0.0))
+    many = _weighed(turned, ops.select(through, flight.weight, 0.0), flight.count > 1)
     return ops.select_record(rough, many, once), flight.rng
 
 
@@ -110,7 +113,7 @@ def sample_reflection(types: Any, meeting: SurfaceMeeting, rng: Any) -> tuple[Sc
     # Weigh by what single events would do, here and back
     there = events.evaluate(meeting, wo, True)
     turned = replace(there, density=there.certain, density_back=there.reverse, reverse=there.density)
-    many = _weighed(turned, ops.select(flight.outside, flight.weight, 0.0))
+    many = _weighed(turned, ops.select(flight.outside, flight.weight, 0.0), flight.count > 1)
     return ops.select_record(rough, many, once), flight.rng
 
 
@@ -171,7 +174,7 @@ def _fly(
             f.light = ops.select_record(f.alive, ops.select_record(reflected, mirrored, refracted.inverted), f.light)
         f.rank = ops.select(reflected | (f.alive ^ True), f.rank, 1 - f.rank)
         f.outside ^= f.alive & (reflected ^ True)
-        f.count += 1
+        f.count += ops.select(f.alive, 1, 0)
         return (f,)
 
     def goes_on(f: Flight) -> Value:
@@ -225,9 +228,10 @@ def _sides(meeting: SurfaceMeeting, outside: Value) -> tuple[Value, Value, Value
     return here, there, outside ^ meeting.above ^ True
 
 
-def _weighed(event: ScatteringEvent, weight: Value) -> ScatteringEvent:
+def _weighed(event: ScatteringEvent, weight: Value, many: Value) -> ScatteringEvent:
     names = "density", "density_back", "certain", "reverse"
-    return replace(event, weight=weight, **{name: getattr(event, name) + _FLOOR for name in names})
+    densities = {name: ops.select(many, _MANY, getattr(event, name) + _FLOOR) for name in names}
+    return replace(event, weight=weight, **densities)
 
 
 def _reverse(w: Direction) -> Direction:

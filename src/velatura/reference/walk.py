@@ -156,19 +156,19 @@ def _scatter(types: Any, layers: WalkedLayers, path: Path, out: WayOut | None, p
         onward, towards, path.rng = facets.scatter(types, meeting, path.weight, path.rng, active, targets)
     else:
         onward = events.sample(meeting, path.weight, u1, u2, u3)
-        towards = [events.evaluate(meeting, *target) for target in targets]
+        towards = [(events.evaluate(meeting, *target),) for target in targets]
     rough = layers.surface(j).smooth ^ True
     if layers.base == "diffuse":
         path.painted |= layers.is_base(j) & (path.inside ^ True)
     # Gather what leaves from here
     if out is not None:
-        gathered = connect_surface(meeting, towards[0], out, path, down)
+        gathered = sum(connect_surface(meeting, event, out, path, down) for event in towards[0])
         if layers.scatters:
             gathered = ops.select(path.inside, connect_medium(layers, out, path), gathered)
         kept = True if painted is None else path.painted ^ (not painted)
         path.value += ops.select(kept, path.weight * gathered, 0.0)
     if out is not None and out.back and (painted is not False or layers.base != "diffuse"):
-        gathered = connect_back(meeting, towards[1], out, path, down)
+        gathered = sum(connect_back(meeting, event, out, path, down) for event in towards[1])
         if layers.scatters:
             gathered = ops.select(path.inside, connect_medium_back(layers, out, path), gathered)
         path.value += path.weight * gathered
