@@ -14,6 +14,8 @@ from velatura.renderer.packets import aligned
 mi = kernel.mitsuba("llvm_ad_rgb")
 import drjit as dr  # noqa: E402
 
+pytestmark = pytest.mark.usefixtures("one_thread")
+
 Flags = mi.BSDFFlags
 RNG = np.random.default_rng(7)
 SIDES = Flags.FrontSide | Flags.BackSide

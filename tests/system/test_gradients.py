@@ -16,6 +16,8 @@ from velatura.renderer import low_discrepancy
 mi = kernel.mitsuba("llvm_ad_rgb")
 import drjit as dr  # noqa: E402
 
+pytestmark = pytest.mark.usefixtures("one_thread")
+
 COATED = vt.Stack(
     [
         vt.Interface(eta=1.5, alpha=0.1),

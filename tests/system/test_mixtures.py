@@ -16,6 +16,8 @@ from velatura.stack import dumps
 mi = kernel.mitsuba("llvm_ad_rgb")
 import drjit as dr  # noqa: E402
 
+pytestmark = pytest.mark.usefixtures("one_thread")
+
 PLUGINS = ("velatura", "belcour2018", "weidlich_wilkie")
 PAINT = vt.Stack([vt.Interface(eta=1.5, alpha=0.1), vt.Diffuse(albedo=[0.5, 0.1, 0.1])])
 METAL = vt.Stack([vt.Interface(eta=0.2, k=3.9, alpha=[0.3, 0.15], rotation=20)])

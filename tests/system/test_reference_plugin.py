@@ -19,6 +19,8 @@ from velatura.stack import Diffuse, Interface, Medium, Stack, dumps
 mi = kernel.mitsuba("llvm_ad_rgb")
 import drjit as dr  # noqa: E402
 
+pytestmark = pytest.mark.usefixtures("one_thread")
+
 kernel.register()
 
 SIGMAS = 4.5

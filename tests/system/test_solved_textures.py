@@ -15,6 +15,8 @@ from velatura.renderer.packets import aligned
 mi = kernel.mitsuba("llvm_ad_rgb")
 import drjit as dr  # noqa: E402
 
+pytestmark = pytest.mark.usefixtures("one_thread")
+
 vt.register()
 
 COATED = vt.Stack(
