@@ -499,7 +499,7 @@ def test_a_server_that_goes_away_and_comes_back(visit: Open, served: Server) -> 
     said(page).get_by_text("The server does not answer.").wait_for()
     page.page.get_by_role("button", name="Cancel").first.click()
     served.start()
-    page.page.get_by_text("Offline, trying again").wait_for(state="detached", timeout=20_000)
+    page.page.get_by_text("Offline, trying again").wait_for(state="detached")
     page.settled()
     assert page.page.evaluate("velatura.problems.map(({ about, text }) => `${about}: ${text}`)") == []
     assert len(page.page.evaluate("velatura.shader().parts[0].lobes")) == 3

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
@@ -18,6 +19,7 @@ if chromium.missing():
 import editor
 
 PRESET = "coated-gold"
+PATIENCE = 90.0  # seconds, as of all visits
 
 
 class Look(editor.Visit):
@@ -26,7 +28,7 @@ class Look(editor.Visit):
     begun: dict[str, list[float]] | None = None  # what the plots read at first
 
     def ready(self) -> None:
-        self.page.wait_for_selector(".inspector .legend", timeout=60_000)
+        self.page.wait_for_selector(".inspector .legend")
         self.page.evaluate("velatura.viewport.setBudget({ samples: 0 })")
 
 
@@ -62,11 +64,10 @@ def painted(visit: Look) -> None:
 
 def until(visit: Look, holds: Callable[[], bool]) -> None:
     """Wait until a condition holds, which is looked at between frames."""
-    for _ in range(200):
-        if holds():
-            return
+    end = time.monotonic() + PATIENCE
+    while not holds():
+        assert time.monotonic() < end
         visit.page.wait_for_timeout(100)
-    assert holds()
 
 
 def read_out(visit: Look) -> dict[str, list[float]]:
@@ -223,7 +224,7 @@ def test_two_models_are_drawn_and_listed_side_by_side(visit: Look) -> None:
         """() => velatura.store.run((state) =>
              ({ ...state, view: { ...state.view, mode: 'split', other: { model: 'belcour2018' } } }))"""
     )
-    visit.page.wait_for_selector("svg.polar .dashed", state="attached", timeout=30_000)
+    visit.page.wait_for_selector("svg.polar .dashed", state="attached")
     assert "- - Belcour 2018" in visit.page.locator(".legend thead").inner_text()
     tab(visit, "Energy")
     assert visit.page.locator("svg.chart .dashed").count() > 0

@@ -51,16 +51,16 @@ class Cell:
 
     def ready(self) -> None:
         """Wait for a picture; from then on the preview alone is drawn, which is quick."""
-        self.wait("shader() && el.velatura.viewport.previewed", PATIENCE)
+        self.wait("shader() && el.velatura.viewport.previewed")
         self.editor.evaluate("(el) => el.velatura.viewport.setBudget({ samples: 0 })")
 
-    def wait(self, condition: str, seconds: float = 30) -> None:
+    def wait(self, condition: str) -> None:
         """Wait until a condition on the editor holds."""
         self.page.wait_for_function(
             f"(index) => {{ const el = document.querySelectorAll('.velatura-cell')[index];"
             f" return el?.velatura && el.velatura.{condition}; }}",
             arg=self.index,
-            timeout=1000 * seconds,
+            timeout=1000 * PATIENCE,
         )
 
     def problems(self) -> list[str]:
@@ -80,7 +80,7 @@ class Notebook:
 
     def until(self, expression: str, value: Any) -> None:
         """Wait until an expression in the kernel has a value."""
-        end = time.monotonic() + 30
+        end = time.monotonic() + PATIENCE
         while (found := self.kernel.run("", expression)) != value:
             assert time.monotonic() < end, f"{expression} stays {found}"
             time.sleep(0.1)
