@@ -31,8 +31,8 @@ def swatches(ax, title, found):
     ax.set(title=title, xticks=[], yticks=[0.75, 0.25], yticklabels=["asked", "has"])
 
 
-places = [["pane", "paint", "mixture", "film"], ["workshop", "edge", "blur", "glint"]]
-figure, axes = plt.subplot_mosaic(places, figsize=(12, 4.6), layout="constrained")
+places = [["pane", "paint", "mixture"], ["film", "workshop", "edge"], ["blur", "glint", "three"]]
+figure, axes = plt.subplot_mosaic(places, figsize=(9.4, 6.9), layout="constrained")
 
 # %%
 # A pane and its tint and haze, and the colour of paint as it is seen through its coat.
@@ -110,3 +110,22 @@ axes["blur"].plot(75, 0.5, "o", color="C0")
 axes["glint"].plot([75] * 3, [0.03, 0.06, 0.1], "o", color="black")
 axes["blur"].set(title="a lobe's blur at 75°", xlabel="angle of incidence", ylabel="alpha")
 axes["glint"].set(title="and its colour", xlabel="angle of incidence", ylabel="energy")
+
+# %%
+# The brightest lobes of clear dielectrics that are found, by blur and number of interfaces: the energy that a refusal
+# offers. Below a rough interface a second one adds nothing, but a third does.
+
+alphas = [0, 0.05, 0.1, 0.2, 0.3]
+for count in (1, 2, 3):
+    most = []
+    for alpha in alphas:
+        try:
+            vt.inverse.invert_stack([{"energy": 0.8, "alpha": alpha, "interfaces": count}], "bati2021")
+        except vt.inverse.Infeasible as refusal:
+            offered = [way.target.lobes[0] for way in refusal.directions]
+            most.append(
+                next(lobe.colour[0] for lobe in offered if lobe.interfaces == count and lobe.base == "dielectric")
+            )
+    axes["three"].plot(alphas, most, ".-", label=f"{count} interface{'s' * (count > 1)}")
+axes["three"].set(title="the brightest clear lobes", xlabel="alpha", ylabel="energy", ylim=(0.3, 0.7))
+axes["three"].legend(fontsize="small")

@@ -496,6 +496,33 @@ def test_what_cannot_be_had_is_said_beside_the_lobe(visit: Open) -> None:
     look.locator(".refused").wait_for(state="detached")
 
 
+def test_a_lobe_of_three_interfaces_is_dragged(visit: Open) -> None:
+    """Expected: three dielectrics with the lobe of one, then more energy than two of this blur have; one step each. Its
+    class has no map, with the reason; undone and read anew it is one lobe still."""
+    page = visit()
+    open_material(page, "Bati 2021, figure 15 c")
+    look = panel(page)
+    chosen(page, 1)
+    before, past = lobes(page), steps(page)
+    look.get_by_label("Number of interfaces").select_option("3 interfaces")
+    answered(page)
+    assert steps(page) == past + 1 and len(lobes(page).energy) == 3
+    assert np.sum(lobes(page).energy, axis=0) == pytest.approx(np.sum(before.energy, axis=0), abs=1e-5)
+    look.get_by_text("Lobe 1: has no map of its class").wait_for()
+    energy = look.get_by_label("Energy, slider")
+    most = int(energy.get_attribute("max"))
+    for share in (0.75, 0.86):
+        energy.fill(str(round(share * most)))
+    answered(page)
+    assert steps(page) == past + 2
+    bright = float(np.mean(np.sum(lobes(page).energy, axis=0)))
+    assert 0.2 < bright < 0.36 and look.locator(".lobe").count() == 1
+    assert [float(alpha[0, 0]) for alpha in lobes(page).alpha] == pytest.approx(
+        [float(before.alpha[0][0, 0])] * 3, abs=1e-3
+    )
+    check_physical(page)
+
+
 def test_a_lobe_that_is_dragged_too_far_is_shown_where_it_is(visit: Open) -> None:
     """Expected: the panel and the layers have one lobe, and a dashed circle is where the hand let go."""
     page = visit()

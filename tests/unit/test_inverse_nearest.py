@@ -211,3 +211,17 @@ def test_a_wish_that_a_part_of_it_leads_to_is_met() -> None:
     for lobe, own in zip(wish.lobes, seen(found.stack.stack, wish, model).lobes):
         assert own.colour == pytest.approx(lobe.colour, abs=1e-5)
         assert own.roughness == pytest.approx(lobe.roughness, abs=1e-4)
+
+
+@pytest.mark.parametrize("model", ["bati2021", "velatura"])
+def test_a_lobe_of_three_interfaces_is_dragged(model: str) -> None:
+    """Expected: a brighter lobe with the blur that it had; of one beyond all dielectrics most of the way, by what
+    a search of all finds."""
+    chosen = named(model)
+    triple = invert_stack([{"energy": 0.2, "alpha": 0.1, "interfaces": 3}], chosen).stack
+    now = seen(triple, Target([{"energy": 0.1, "interfaces": 3}]), chosen)
+    found = answer(triple, now.with_energy(0, (0.26,) * 3), chosen)
+    assert found.met and found.reached.lobes[0].roughness == pytest.approx(0.1, abs=1e-4)
+    assert found.reached.lobes[0].colour[0] == pytest.approx(0.26, abs=1e-5)
+    beyond = answer(triple, now.with_energy(0, (0.7,) * 3), chosen)
+    assert not beyond.met and 0.38 < beyond.reached.lobes[0].colour[0] < 0.7

@@ -260,8 +260,8 @@ def test_the_nearest_targets_lie_on_the_bounds() -> None:
         ([{"energy": [0.1, 0.2]}], "lobe 1: energy: must be a number, [r, g, b]"),
         ([{"energy": 0.1, "alpha": 2}], "lobe 1: alpha: must lie in 0 to 1, got 2"),
         ([{"energy": 0.1, "alpha": 0.1, "variance": 0.1}], "lobe 1: variance: not together with alpha"),
-        ([{"energy": 0.1, "interfaces": 3}], "lobe 1: interfaces: must be 1 or 2, got 3"),
-        ([{"energy": 0.1, "interfaces": True}], "lobe 1: interfaces: must be 1 or 2, got True"),
+        ([{"energy": 0.1, "interfaces": 4}], "lobe 1: interfaces: must be 1, 2 or 3, got 4"),
+        ([{"energy": 0.1, "interfaces": True}], "lobe 1: interfaces: must be 1, 2 or 3, got True"),
         ([{"energy": 0.1, "base": "metal"}], "lobe 1: base: must be one of dielectric, conductor"),
         ([{"enrgy": 0.1}], "lobe 1: unknown key 'enrgy' (did you mean energy?)"),
         ([{"energy": 0.1, "base": "conductor"}, {"energy": 0.1}], "lobe 1: base: only the last lobe"),
@@ -757,3 +757,51 @@ def test_pairs_with_fixed_indices_are_found_or_refused() -> None:
             if (asked := lobe.fixed.of("eta", 0)) is not None:
                 assert float(np.ravel(upper.eta)[0]) == asked
     assert found > 2
+
+
+# Three interfaces a lobe ---------------------------------------------------------------------------------------------
+
+THREE = {
+    "dielectric": [{"energy": 0.2, "alpha": 0.1, "interfaces": 3}],
+    "metal": [{"energy": (0.3, 0.25, 0.2), "alpha": 0.1, "interfaces": 3, "base": "conductor"}],
+    "below": [{"energy": 0.05, "alpha": 0.05}, {"energy": (0.1, 0.2, 0.15), "alpha": 0.2, "interfaces": 3}],
+}
+
+
+@pytest.mark.parametrize("model", ["bati2021", "velatura"])
+@pytest.mark.parametrize("kind", THREE)
+def test_three_interfaces_give_one_lobe(kind: str, model: str) -> None:
+    """Expected: the model reads the lobe, each of the three as blurred; others have it, too, and the class is that of
+    the last two, of which the chosen ones are members."""
+    target = Target(THREE[kind])
+    found = invert_stack(target, model)
+    assert max(read(target, found.stack, named(model))) < 1e-6
+    if model == "bati2021":
+        members = found.classes[-1]
+        indices = [float(np.ravel(part.eta)[0]) for part in found.layers[-2:] if part.kind == "dielectric"]
+        assert members.interfaces == 2 and members.contains(*indices).all()
+        others = alternatives(target, 3, model)
+        assert len(others) == 3
+        for other in others:
+            assert max(read(target, other.stack, named(model))) < 1e-6
+
+
+@pytest.mark.parametrize("count", [1, 2, 3])
+def test_smooth_dielectrics_reflect_at_most_what_a_series_of_them_does(count: int) -> None:
+    """Truth: interfaces between indices 1 and 4 in turn, each of which reflects r, have n r / (1 + (n - 1) r)."""
+    r = 0.36
+    most = count * r / (1 + (count - 1) * r)
+    assert in_closed_form(Target([{"energy": most - 0.01, "interfaces": count}]), AVERAGED) is not None
+    with pytest.raises(Infeasible) as caught:
+        invert_stack([{"energy": most + 0.01, "interfaces": count}], AVERAGED)
+    assert caught.value.constraint == "energy"
+    first = caught.value.directions[0].target.lobes[0]
+    assert first.colour[0] == pytest.approx(most, abs=0.02) or first.interfaces > count
+
+
+def test_what_is_fixed_of_three_interfaces_stays() -> None:
+    lobe = {"energy": 0.2, "alpha": 0.1, "interfaces": 3, "fixed": {"eta": [1.5, None, None], "tau": [None, 0.1, None]}}
+    found = invert_stack([lobe], "bati2021")
+    values = found.stack.flat()
+    assert (values["layer0_eta"], values["layer1_sigma_a"]) == (pytest.approx(1.5), pytest.approx(0.1))
+    assert max(read(found.target, found.stack, AVERAGED)) < 1e-6

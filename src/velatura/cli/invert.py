@@ -67,7 +67,7 @@ def invert(
       alpha       GGX roughness, 0 to 1, 0 unless given; or variance in its place;
                   [u, v] along two axes of a brushed lobe
       rotation    of these, in degrees anticlockwise as seen from outside
-      interfaces  that make it: 1, or a pair, 2
+      interfaces  that make it: 1, a pair, 2, or 3
       base        dielectric or, of the last lobe, conductor
       tint        of a conductor, 0 (strongest edge tint) to 1
       fixed       {eta, k, alpha, tau, films}: of each interface, or null: [1.5]

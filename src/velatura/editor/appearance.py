@@ -17,6 +17,7 @@ from velatura.figures.bati2021_targets import FIGURES
 from velatura.inverse import Fixed, Infeasible, Target, coat, invert_stack, solution
 from velatura.inverse.coats import with_albedo
 from velatura.inverse.lobes.interface import conductor_tint
+from velatura.inverse.lobes.target import MOST_INTERFACES
 from velatura.inverse.local.coordinates import plain
 from velatura.inverse.local.dragged import DraggedStack, seen
 from velatura.inverse.nearest import lobes_of, nearest
@@ -97,8 +98,10 @@ def appearance(body: Body) -> Answer:
     each = DraggedStack.of(stack, _target(stack, parts, [1] * len(parts)), model)
     assert each is not None
     counts: list[int] = body.get("interfaces") or _counts(each.variances, parts)
-    if sum(counts) != len(parts) or not set(counts) <= {1, 2}:
-        raise InvalidInput(f"interfaces: must be 1 or 2 for each lobe, {len(parts)} in all, got {counts}")
+    if sum(counts) != len(parts) or not set(counts) <= set(range(1, MOST_INTERFACES + 1)):
+        raise InvalidInput(
+            f"interfaces: must be 1 to {MOST_INTERFACES} for each lobe, {len(parts)} in all, got {counts}"
+        )
     whole = DraggedStack.of(stack, _target(stack, parts, counts), model)
     assert whole is not None
     target = lobes_of(stack, whole)
@@ -142,17 +145,21 @@ def haze(target: Target, model: Model) -> list[Answer]:
 
 
 def _counts(variances: np.ndarray, parts: list[Any]) -> list[int]:
-    """Interfaces of every lobe: two neighbours that blur alike are one, unless light is scattered between them."""
-    counts: list[int] = []
+    """Interfaces of every lobe: neighbours that blur alike are one, unless light is scattered between them: two, or the
+    last three of an odd number."""
+    runs: list[int] = []
     previous = None
     for s, part in zip(variances, parts):
-        alike = previous is not None and np.abs(s - previous).max() <= ALIKE
-        if alike and counts[-1] == 1 and part.scatters is None:
-            counts[-1] = 2
+        if previous is not None and np.abs(s - previous).max() <= ALIKE and part.scatters is None:
+            runs[-1] += 1
         else:
-            counts.append(1)
+            runs.append(1)
         previous = s
-    return counts
+    return [count for run in runs for count in _shared(run)]
+
+
+def _shared(run: int) -> list[int]:
+    return [1] if run == 1 else [2] * (run // 2 - run % 2) + [3] * (run % 2)
 
 
 def _target(stack: Stack, parts: list[Any], counts: list[int]) -> Target:
@@ -162,13 +169,13 @@ def _target(stack: Stack, parts: list[Any], counts: list[int]) -> Target:
         own = parts[n : n + count]
         axis = next((r.rotation for r in (part.roughness for part in reversed(own)) if r.alpha_u != r.alpha_v), axis)
         tau = np.broadcast_to(own[0].tau, (3, 1))[:, 0]
-        pinned = bool(np.any(tau)) and (count == 2 or n == 0)
+        pinned = bool(np.any(tau)) and (count > 1 or n == 0)
         fixed: Answer = {"tau": [tuple(tau.tolist()), *[None] * (count - 1)]} if pinned else {}
         if any(part.films for part in own):
             fixed["films"] = [part.films or None for part in own]
         tint = 0.5
         if own[-1].kind == "conductor":
-            above = own[0].eta if count == 2 else eta
+            above = own[-2].eta if count > 1 else eta
             tint = _tint(own[-1], above)
         form = {"interfaces": count, "base": own[-1].kind, "tint": tint, "fixed": fixed}
         lobes.append({"energy": 0.0, "rotation": float(np.degrees(axis)), **form})

@@ -46,7 +46,10 @@ def class_(body: Body) -> Answer:
             f"lobe {lobe + 1}: has no map of its class, since thin films change what its indices reflect; "
             "drag its lobe, or choose one without films"
         )
-    free, wanted = _members(near, lobe), near.target.lobes[lobe]
+    wanted = near.target.lobes[lobe]
+    if wanted.interfaces > 2:
+        raise InvalidInput(f"lobe {lobe + 1}: has no map of its class, since three interfaces leave two indices free")
+    free = _members(near, lobe)
     members = free.held(tau_0=near.depths_of(lobe)[0]) if wanted.interfaces == 2 else free
     axis = np.geomspace(1.0, target.eta_max, size)
     answer: Answer = {"member": near.point_of(lobe), "point": near.point_of(lobe), "depths": _depths(near, lobe, free)}

@@ -21,6 +21,7 @@ from numpy.typing import ArrayLike
 from velatura.editor import library
 from velatura.editor.arrays import Picture, Triangles
 from velatura.errors import InvalidInput
+from velatura.inverse.lobes.target import MOST_INTERFACES
 from velatura.inverse.wishes import Available
 from velatura.inverse.wishes.wish import STEEPEST
 from velatura.model import DEFAULT, Model, named
@@ -209,7 +210,7 @@ KEYS: dict[str, Parameter] = {
     "layer": Whole("which layer of the material", high=LAYERS - 1),
     "film": Whole("which film of the layer", high=Films.most - 1),
     "thickness_nm": Scalar("of a film", low=1, high=THICKEST_NM, texturable=False),
-    "interfaces": Several("interfaces of each lobe", entry=Whole("", low=1, high=2)),
+    "interfaces": Several("interfaces of each lobe", entry=Whole("", low=1, high=MOST_INTERFACES)),
     "point": Several("of a class", most=3),
     "map": Words("of a class"),
     "depths": Fields("of a member: optical depths [r, g, b] by name"),

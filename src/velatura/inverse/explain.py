@@ -122,8 +122,10 @@ def _violated(tried: stacks.Partial, lobe: TargetLobe) -> list[str]:
     if not len(tried.cost):
         return ["fixed"]  # between no two interfaces is there an index that gives it
     layers = tried.layers[-lobe.interfaces :]
-    if not np.any(layers[0].feasible):  # what it leaves for the one below has no meaning
-        layers = layers[:1]
+    for n, upper in enumerate(layers[:-1], 1):
+        if not np.any(upper.feasible):  # what it leaves for those below has no meaning
+            layers = layers[:n]
+            break
     names = [key for part in layers for key in part.margins]
     margins = np.array(np.broadcast_arrays(*(m for part in layers for m in part.margins.values())))
     broken = np.maximum(np.minimum(margins, 0), -1e9)
@@ -330,8 +332,9 @@ def _of_form(target: Target, n: int, last: bool) -> Iterator[Way]:
     """A lobe of as many interfaces as it has not, below a medium of its colour, with another base, or with nothing
     fixed."""
     lobe, what = target.lobes[n], f"lobe {n + 1}"
+    count = 1 if lobe.interfaces == 2 else 2
     forms: list[tuple[str, dict[str, object], float]] = [
-        (f"{what} interfaces {3 - lobe.interfaces}", {"interfaces": 3 - lobe.interfaces, "fixed": Fixed()}, PAIRED)
+        (f"{what} interfaces {count}", {"interfaces": count, "fixed": Fixed()}, PAIRED)
     ]
     if n == 0 and lobe.interfaces == 1 and lobe.base == "dielectric" and np.ptp(lobe.colour) > 0:
         tau = tuple((0.5 * np.log(max(lobe.colour) / np.maximum(lobe.colour, LEAST))).tolist())

@@ -57,9 +57,14 @@ def draw_classes(figure: Figure, solution: Solution, title: str) -> None:
     figure.suptitle(f"{title}: what gives each lobe, by {solution.model.name}", wrap=True)
     layers = iter(solution.layers)
     for n, (members, lobe) in enumerate(zip(solution.classes, solution.target.lobes), 1):
-        made_of = {1: f"one {lobe.base}", 2: f"a pair that ends in a {lobe.base}"}[lobe.interfaces]
+        made_of = {
+            1: f"one {lobe.base}",
+            2: f"a pair that ends in a {lobe.base}",
+            3: f"the last two of three, a {lobe.base} below",
+        }[lobe.interfaces]
         axes = figure.add_subplot(1, len(solution.classes), n, title=f"lobe {n}: {made_of}")
-        draw(axes, members, tuple(next(layers) for _ in range(lobe.interfaces)))
+        own = tuple(next(layers) for _ in range(lobe.interfaces))
+        draw(axes, members, own[-members.interfaces :])
 
 
 def draw(axes: Any, members: EquivalenceClass, chosen: tuple[Layers, ...] | None = None) -> None:

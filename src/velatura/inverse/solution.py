@@ -96,13 +96,17 @@ class Solution(Result):
 
     @cached_property
     def classes(self) -> tuple[EquivalenceClass, ...]:
-        """The equivalence class of every lobe, below the layers chosen above it, by that model in closed form."""
+        """The equivalence class of every lobe, below the layers chosen above it, by that model in closed form; of three
+        interfaces that of the last two, below the first."""
         target, layers, found = self.in_closed_form.target, iter(self.layers), []
         above = start(target, self.model)
         for n, lobe in enumerate(target.lobes):
-            found.append(class_of(above, lobe, target, first=n == 0))
-            for _ in range(lobe.interfaces):
-                above, _read = above.below(next(layers))
+            left = np.array(lobe.colour)
+            for k in range(lobe.interfaces):
+                if k == max(lobe.interfaces - 2, 0):
+                    found.append(class_of(above, lobe.below(k, left.tolist()), target, first=n == 0))
+                above, read = above.below(next(layers))
+                left = left - np.broadcast_to(read.energy, (3, 1))[:, 0]
         return tuple(found)
 
 

@@ -36,7 +36,7 @@ def closer(target: Target, model: Model, found: Partial | None) -> Partial | Non
     Generations of indices about those that come nearest to the bounds, or that are preferred, ever closer. The stacks
     that are found already stay. None where there are none.
     """
-    open_ = [n for n, lobe in enumerate(target.lobes) if stacks.is_open(lobe)]
+    open_ = [n for n, lobe in enumerate(target.lobes) if lobe.interfaces == 2 and stacks.is_open(lobe)]
     if not open_ or any(target.lobes[n].fixed.of("alpha", 1) is not None for n in open_):
         return found
     rng, top = np.random.default_rng(0), float(np.log(target.eta_max))
@@ -92,8 +92,8 @@ def _apart(y: Array, order: np.ndarray, distance: float) -> np.ndarray:
 def _along(target: Target, model: Model, indices: Mapping[int, Array]) -> tuple[Partial, np.ndarray, Array]:
     """The stacks with given indices, (N,) by lobe, which of the N each has, and how near each of the N comes, (N,).
 
-    Other pairs have a fixed index. The last is the number of lobes that it has, and less than 1 for the margin that the
-    next one misses.
+    Other pairs have a fixed index, and lobes of three interfaces few. The last is the number of lobes that it has, and
+    less than 1 for the margin that the next one misses.
     """
     paths = stacks.beginning(target, model)
     count = len(next(iter(indices.values())))
@@ -161,18 +161,18 @@ def _redrawn(
 ) -> Partial:
     """Partial stacks with a lobe whose free coordinates are drawn from shares of their ranges, feasible or not."""
     count, energy = len(paths.cost), np.array(lobe.colour)[:, None]
-    if lobe.interfaces == 2:
-        tau: Value = stacks.pinned_above(lobe)
-        if lobe.fixed.of("tau", 0) is None:
+    for n in range(lobe.interfaces - 1):
+        tau: Value = stacks.pinned_above(lobe, n)
+        if lobe.fixed.of("tau", n) is None and n == 0:
             state = paths.above.state
             most = 0.5 * np.log(np.maximum(state.t_0i * state.t_i0 / np.maximum(energy, interface.ENERGY_MIN), 1.0))
             tau = share * random_depths(np.broadcast_to(most, (3, count)), rng)
-        eta = np.broadcast_to(known[0].eta, (1, count))
-        if stacks.is_open(lobe) and lobe.fixed.of("alpha", 1) is None:
+        eta = np.broadcast_to(known[n].eta, (1, count))
+        if lobe.fixed.of("eta", n) is None and lobe.fixed.of("alpha", lobe.interfaces - 1) is None:
             top = np.log(target.eta_max)
             near = np.clip(np.log(eta) + share * top * rng.uniform(-1, 1, count), 0, top)
             eta = np.exp(np.where(share < 1, near, top * rng.random(count)))
-        paths, energy = stacks.with_upper(paths, lobe, target, eta, tau)
+        paths, energy = stacks.with_upper(paths, lobe, n, energy, target, eta, tau)
     choice = stacks.choice_of(lobe, target, first)
     side = np.where(rng.random(count) < 0.5, DENSER, RARER)
     choice = dataclasses.replace(choice, side=side, tint=rng.random(count))

@@ -1,6 +1,6 @@
-"""Lobes to stacks: any number of lobes, of one or two interfaces each, from the top (Bati et al. 2021, Algorithm 2).
+"""Lobes to stacks: any number of lobes, of one to three interfaces each, from the top (Bati et al. 2021, Algorithm 2).
 
-Every lobe has free choices: one of two indices, and in a pair the index between its interfaces. Choices above limit the
+Every lobe has free choices: one of two indices, and the indices between its interfaces. Choices above limit the
 possible layers below, so that many partial stacks are followed at once.
 """
 
@@ -24,6 +24,7 @@ from velatura.model import Model
 from velatura.model.variance import Variance
 from velatura.ops import Value
 
+TRIED = 4096  # stacks with two interfaces of a lobe of three that are followed
 ALPHA_APART, ENOUGH = 1e-4, 1e-6  # by which a roughness may miss the one that is fixed, and may where that is sought
 
 
@@ -93,28 +94,31 @@ def class_of(above: Above, lobe: TargetLobe, target: Target, first: bool) -> Equ
 def extended(
     paths: Partial, lobe: TargetLobe, target: Target, spread: int, first: bool, given: Array | None = None
 ) -> Partial:
-    """All partial stacks with all free choices of a lobe, feasible or not; `given`: an index between its interfaces for
+    """All partial stacks with all free choices of a lobe, feasible or not; `given`: an index between two interfaces for
     each, (N,)."""
     energy = np.array(lobe.colour)[:, None]
     choice = choice_of(lobe, target, first)
 
-    # Let the index between two interfaces run, that of the medium above included, where the upper one vanishes
-    if lobe.interfaces == 2 and given is not None:
-        paths, energy = with_upper(paths, lobe, target, given[None], pinned_above(lobe))
-    elif lobe.interfaces == 2:
+    # Let indices between interfaces run, that of the medium above included, where the upper one vanishes
+    for n in range(lobe.interfaces - 1):
+        if given is not None:
+            paths, energy = with_upper(paths, lobe, n, energy, target, given[None], pinned_above(lobe, n))
+            continue
         count = len(paths.cost)
-        pinned = lobe.fixed.of("eta", 0)
+        pinned = lobe.fixed.of("eta", n)
         tried = np.array([pinned]) if pinned is not None else np.geomspace(1, target.eta_max, spread)
         eta = np.tile(tried, count)
         if pinned is None:
             eta = np.r_[eta, np.broadcast_to(paths.above.eta, (1, count))[0]]
         index = np.r_[np.repeat(np.arange(count), len(tried)), np.arange(count)][: len(eta)]
-        if pinned is None and lobe.fixed.of("alpha", 1) is not None:
+        if pinned is None and lobe.interfaces == 2 and lobe.fixed.of("alpha", 1) is not None:
             index, eta = _of_fixed_roughness(paths, lobe, _variance(paths, lobe), choice, tried)
-        paths, energy = with_upper(paths.take(index), lobe, target, eta[None], pinned_above(lobe))
+        left = take(energy, index, count)
+        paths, energy = with_upper(paths.take(index), lobe, n, left, target, eta[None], pinned_above(lobe, n))
         possible = np.broadcast_to(paths.layers[-1].feasible, paths.cost.shape)
         if possible.any():  # what the others leave takes long to solve for
             kept = np.flatnonzero(possible)
+            kept = kept[np.linspace(0, len(kept) - 1, min(len(kept), TRIED)).astype(int)] if n else kept
             paths, energy = paths.take(kept), take(energy, kept, len(possible))
 
     # Take either index of the interface that gives what is left
@@ -126,12 +130,14 @@ def extended(
     return with_last(paths, energy, lobe, choice)
 
 
-def with_upper(paths: Partial, lobe: TargetLobe, target: Target, eta: Array, tau: Value) -> tuple[Partial, Array]:
-    """Partial stacks with the upper interfaces of a pair, and the energy that these leave, (C, N)."""
-    energy = np.array(lobe.colour)[:, None]
-    coated = lobe.fixed.films_of(0)
+def with_upper(
+    paths: Partial, lobe: TargetLobe, n: int, energy: Array, target: Target, eta: Array, tau: Value
+) -> tuple[Partial, Array]:
+    """Partial stacks with the n-th interfaces of a lobe, others of which follow, and the energy, (C, N), that these
+    leave of one."""
+    coated = lobe.fixed.films_of(n)
     upper = pair.top(paths.above, energy, _variance(paths, lobe), eta, tau, target.eta_max, coated=coated)
-    return _with(paths, _held(upper.layers, lobe, 0), upper.below), energy - upper.energy
+    return _with(paths, _held(upper.layers, lobe, n), upper.below), energy - upper.energy
 
 
 def with_last(paths: Partial, energy: Array, lobe: TargetLobe, choice: Choice) -> Partial:
@@ -176,19 +182,19 @@ def _of_fixed_roughness(
 
 
 def is_open(lobe: TargetLobe) -> bool:
-    """Whether the index between the interfaces of a lobe is free."""
-    return lobe.interfaces == 2 and lobe.fixed.of("eta", 0) is None
+    """Whether an index between the interfaces of a lobe is free."""
+    return any(lobe.fixed.of("eta", n) is None for n in range(lobe.interfaces - 1))
 
 
-def pinned_above(lobe: TargetLobe) -> Value:
-    """Optical depths of the medium above a pair, 0 where they are free."""
-    tau = _pinned(lobe, "tau", 0)
+def pinned_above(lobe: TargetLobe, n: int = 0) -> Value:
+    """Optical depths of the medium above an upper interface of a lobe, 0 where they are free."""
+    tau = _pinned(lobe, "tau", n)
     return 0.0 if tau is None else tau
 
 
 def choice_of(lobe: TargetLobe, target: Target, first: bool) -> Choice:
     """The choice of the last interface of a lobe; nothing absorbs above the first interface unless that is fixed."""
-    return _choice(lobe, lobe.interfaces - 1, target, absorbs=lobe.interfaces == 2 or not first)
+    return _choice(lobe, lobe.interfaces - 1, target, absorbs=lobe.interfaces > 1 or not first)
 
 
 def _choice(lobe: TargetLobe, n: int, target: Target, absorbs: bool) -> Choice:

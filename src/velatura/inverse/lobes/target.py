@@ -37,6 +37,7 @@ KEPT = 1e-6  # by which what is fixed may be missed
 ROUND = 1e-6  # difference of roughnesses of a lobe that has no axes
 FURTHER = (*KINDS, "available", "thinnest")  # keys that ask for more than lobes
 LEAST = 1e-4  # energy or variance below which targets do not differ
+MOST_INTERFACES = 3  # of a lobe
 
 
 @dataclass(frozen=True)
@@ -45,7 +46,8 @@ class Count(Whole):
 
     @property
     def values(self) -> str:
-        return " or ".join(map(str, range(self.low, self.high + 1)))
+        *others, last = map(str, range(self.low, self.high + 1))
+        return f"{', '.join(others)} or {last}"
 
 
 @dataclass(frozen=True)
@@ -145,7 +147,7 @@ class TargetLobe(Record):
     rotation: Annotated[
         float, _number("turn of its first axis, anticlockwise seen from outside", low=-1e9, unit="degrees")
     ] = 0.0
-    interfaces: Annotated[int, Count("interfaces that make the lobe", low=1, high=2)] = 1
+    interfaces: Annotated[int, Count("interfaces that make the lobe", low=1, high=MOST_INTERFACES)] = 1
     base: Annotated[str, Choice("what its last interface is", options=("dielectric", "conductor", "mirror"))] = (
         "dielectric"
     )
@@ -220,6 +222,12 @@ class TargetLobe(Record):
         pins = [("eta", last), ("k", last), *(("alpha", n) for n in range(self.interfaces))]
         pins += [("tau", last)] if last or not first else []
         return any(self.fixed.of(key, n) is not None for key, n in pins)
+
+    def below(self, count: int, energy: Iterable[float]) -> TargetLobe:
+        """What is left of the lobe, with an energy, below the first `count` of its interfaces."""
+        fixed = {key: entries[count:] for key, entries in self.fixed}
+        left = {"interfaces": self.interfaces - count, "energy": tuple(energy), "fixed": Fixed(**fixed)}
+        return self.model_copy(update=left)
 
     def blur(self, f: RoughnessMap, kind: type[Variance]) -> Variance:
         """The variance of the lobe, (1,) each, of a kind that holds it, in the space of a roughness map."""

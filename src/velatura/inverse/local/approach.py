@@ -8,6 +8,7 @@ from __future__ import annotations
 import dataclasses
 from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 
@@ -17,7 +18,7 @@ from velatura.inverse.local.coordinates import Bound, Point, Reading, Space, uni
 from velatura.optics import fresnel
 
 MAY, STAYS = (0.03, 1e-4), 1.0  # weights of lobes that may change, at first and in the end, and of others
-ALIKE = 10.0  # weight of how the blurs of a pair differ
+ALIKE = 10.0  # weight of how the blurs of a lobe's interfaces differ
 STILL = 1e-7  # weight of the coordinates themselves, where readings leave them open
 ON_BOUND = 1e3  # weight of a bound that no box of coordinates expresses
 BOUNDS, HALVINGS = 4, 40  # of these in one step, and of a step that breaks one of them nevertheless
@@ -112,7 +113,7 @@ class Approach:
         return np.where(more > 0, 1 / (np.maximum(reading, 0.0) + np.where(more > 0, more, 1.0)), 1.0)
 
     def _rows(self, may: float) -> Array:
-        """Weighted sums of readings: energies, of every lobe the mean variances and how those of a pair differ.
+        """Weighted sums of readings: energies, of every lobe the mean variances and how those of neighbours differ.
 
         may: weight of what may change.
         """
@@ -126,11 +127,12 @@ class Approach:
             for entry in range(space.entries):
                 at = [count + space.entries * n + entry for n in own]
                 unit = 1.0 if self._logarithmic[at[0]] > 0 else 1 / size
-                row, apart = np.zeros(len(self.goal)), np.zeros(len(self.goal))
+                row = np.zeros(len(self.goal))
                 row[at] = weight[at[0]] * unit / len(at)
                 rows.append(row)
-                if len(at) == 2:
-                    apart[at] = ALIKE * unit, -ALIKE * unit
+                for two in pairwise(at):
+                    apart = np.zeros(len(self.goal))
+                    apart[list(two)] = ALIKE * unit, -ALIKE * unit
                     rows.append(apart)
         return np.array(rows)
 

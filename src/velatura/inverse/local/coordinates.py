@@ -269,7 +269,7 @@ class Space:
         return np.concatenate([[max(e, ENERGY_MIN) for lobe in wish.lobes for e in lobe.colour], *s])
 
     def target_of(self, reading: Array, form: Target) -> Target:
-        """The target of a form with lobes as they are read, of a pair with the mean variance of both interfaces."""
+        """The target of a form with lobes as they are read, of several interfaces with their mean variance."""
         variances = reading[3 * self.lobes :].reshape(len(self.interfaces), -1)
         for k in range(self.lobes):
             s = np.mean([variances[n] for n, own in enumerate(self.interfaces) if own.lobe == k], axis=0)
@@ -528,7 +528,7 @@ class Reader:
             "films": part.films,
         }
         if not last:
-            own = self._upper(k, float(np.mean(ratio)), values)
+            own = self._upper(k, n, float(np.mean(ratio)), values)
         elif part.kind == "mirror":
             own = self._mirror(k, values)
         elif part.kind == "dielectric":
@@ -541,9 +541,9 @@ class Reader:
         elif own.kind == "dielectric":
             self.eta_1 = self.eta_1 * float(np.mean(ratio))
 
-    def _upper(self, k: int, ratio: float, values: dict[str, Any]) -> InterfaceCoordinates:
-        """The upper interface of a pair."""
-        pinned, top = self.target.lobes[k].fixed.of("eta", 0), float(np.log(self.target.eta_max))
+    def _upper(self, k: int, n: int, ratio: float, values: dict[str, Any]) -> InterfaceCoordinates:
+        """The n-th interface of a lobe, below which are others of it."""
+        pinned, top = self.target.lobes[k].fixed.of("eta", n), float(np.log(self.target.eta_max))
         index = self._coordinate(k, float(np.log(pinned or self.eta_1 * ratio)), "index", 0.0, top)
         return InterfaceCoordinates(**values, log_index=index)
 

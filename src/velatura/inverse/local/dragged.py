@@ -250,10 +250,10 @@ class DraggedStack:
     def _beside(self, aside: float) -> DraggedStack | None:
         """The stack with free choices off by a little, which leads past a jump of readings; None without any."""
         x = self.point.x.copy()
-        for own in self.interfaces:
+        for n, own in enumerate(self.interfaces):
             if own.depth is not None:
                 x[own.depth] += abs(aside)
-            if own.log_index is not None and self.target.lobes[own.lobe].fixed.of("eta", 0) is None:
+            if own.log_index is not None and self._is_free(n):
                 x[own.log_index] += abs(aside) if x[own.log_index] < abs(aside) else aside
         x = self.space.clipped(x)
         return None if np.array_equal(x, self.point.x) else self.at(x)
@@ -284,7 +284,7 @@ class DraggedStack:
         settled = max((k for k, lobe in enumerate(target.lobes) if lobe.fixes_last), default=-1)
         for n, own in enumerate(self.interfaces):
             lobe, above = target.lobes[own.lobe], own.lobe <= settled
-            place = n - min(m for m, other in enumerate(self.interfaces) if other.lobe == own.lobe)
+            place = self._place(n)
             if lobe.fixed.of("alpha", place) is not None:
                 held += range(own.variance.start, own.variance.stop)
             if own.log_index is not None and (above or lobe.fixed.of("eta", place) is not None):
@@ -300,6 +300,14 @@ class DraggedStack:
                     span = [most]
                 held += span
         return held, caps
+
+    def _place(self, n: int) -> int:
+        """The place of the n-th interface in its lobe."""
+        return n - min(m for m, other in enumerate(self.interfaces) if other.lobe == self.interfaces[n].lobe)
+
+    def _is_free(self, n: int) -> bool:
+        """Whether the index of the n-th interface is not fixed."""
+        return self.target.lobes[self.interfaces[n].lobe].fixed.of("eta", self._place(n)) is None
 
     def missed(self, wish: Target, which: Array | slice = slice(None)) -> float:
         """The largest difference of its energies and variances, or `which` of them, from those of a target."""
@@ -337,10 +345,10 @@ class DraggedStack:
     def _giving(self, bound: Bound, held: Sequence[int]) -> list[int]:
         """Kept coordinates that may change at a bound: those of the nearest lobe first."""
         found = []
-        for own in reversed([own for own in self.interfaces if own.lobe <= bound.lobe]):
+        for n, own in reversed([each for each in enumerate(self.interfaces) if each[1].lobe <= bound.lobe]):
             if own.depth is not None and (self.point.x[own.depth] > 0 or own.films) and np.any(own.kept):
                 found.append(own.depth)
-            if own.log_index is not None and self.target.lobes[own.lobe].fixed.of("eta", 0) is None:
+            if own.log_index is not None and self._is_free(n):
                 found.append(own.log_index)
         return [coordinate for coordinate in found if coordinate not in held]
 

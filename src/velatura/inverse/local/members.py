@@ -80,7 +80,7 @@ def _deepened(stack: DraggedStack, k: int, depths: Mapping[int, Array]) -> Dragg
                 u = x[below.reflectances]
                 most = {"conductor": CONDUCTOR_MAX, "mirror": 1.0}.get(below.kind, REFLECTANCE_MAX)
                 x[below.reflectances] = np.minimum(u * (darker if len(u) == 3 else np.mean(darker)), most)
-        if n == 0 and (len(places) == 2 or k == 0):
+        if n == 0 and (len(places) > 1 or k == 0):
             target = with_depth(target, k, depth)
     return stack.at(x, dataclasses.replace(stack.space, interfaces=tuple(interfaces))).renamed(target)
 

@@ -330,6 +330,7 @@ export function mountAppearance(element, services) {
           options: [
             ['1', '1 interface'],
             ['2', '2 interfaces'],
+            ['3', '3 interfaces'],
           ],
           choose: (count) => once(index, { interfaces: Number(count) }),
         })}
