@@ -53,6 +53,7 @@ EXAMPLES = (
     "phases",
     "pigments",
     "polarised",
+    "polariser",
     "inverse",
     "wishes",
     "fit",

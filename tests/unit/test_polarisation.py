@@ -136,8 +136,8 @@ def test_light_from_facet_to_facet_has_the_parameters_of_its_fields(name: str) -
             s, p = np.sqrt(1 - s**2), np.sqrt(1 - p**2)
         # The same event in other coordinates, and back
         there = turned(light).at(tuple(seen(field.w)), tuple(seen(h)))
-        intensity = intensity * matrix.share(there)
-        there = matrix.applied(there)
+        intensity = intensity * there.share(matrix)
+        there = there.sent(matrix)
         back = {"turned": lambda light: light.seen_by(lambda x: turn(x, -0.7))}.get(name, turned)
         light = back(there)
         field = field.meet(h, s, p, onwards)
@@ -151,7 +151,7 @@ def test_light_from_facet_to_facet_has_the_parameters_of_its_fields(name: str) -
 def test_a_facet_that_is_met_at_the_normal_has_no_plane() -> None:
     matrix = Mueller(0.3, 0.3, -0.3, 0.0)
     light = Polarisation((1.0, 0.0, 0.0), 0.3, 0.4, 0.5).at((0.0, 0.0, -1.0), (0.0, 0.0, 1.0))
-    after = matrix.applied(light)
+    after = light.sent(matrix)
     assert (light.q, light.u, light.v) == (0.3, 0.4, 0.5)
     # Right is left after reflection, and so is the side to which a field leans
     np.testing.assert_allclose((after.q, after.u, after.v), (0.3, -0.4, -0.5))

@@ -29,10 +29,11 @@ class PolarisedFilms:
 
     def __init__(self, within: ColourTable, total: ColourTable | None) -> None:
         self.within, self.total = within, total
+        self.channels = within.data.shape[-1] // (12 if total else 4)
 
     def opaque(self, cosine: Value, like: Value) -> Mueller:
         """Matrix of light that an opaque interface reflects, by colours of the kind of `like`."""
-        return Mueller(*self.within.colours(like, cosine))
+        return Mueller(*self.within.colours(like, cosine, count=self.channels))
 
     def dielectric(
         self, from_rarer: Value, cosine: Value, cos_t: Value, eta: Value, like: Value
@@ -41,10 +42,10 @@ class PolarisedFilms:
         reflected, and the index there over that here."""
         assert self.total
         passes = cos_t > 0
-        found = self.within.colours(like, ops.select(from_rarer, cosine, cos_t))
+        found = self.within.colours(like, ops.select(from_rarer, cosine, cos_t), count=self.channels)
         share = ops.minimum(ops.divide(cosine, ops.sqrt(1 - eta * eta)), 1.0)
         angle = ops.arctan2(ops.sqrt(1 - share * share), share) * (2 / pi)
-        each = zip(found[:4], found[4:8], self.total.colours(like, angle))
+        each = zip(found[:4], found[4:8], self.total.colours(like, angle, count=self.channels))
         reflection = Mueller(*(ops.select(passes, ops.select(from_rarer, a, b), total) for a, b, total in each))
         return reflection, Mueller(*found[8:])
 

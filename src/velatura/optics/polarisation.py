@@ -1,4 +1,4 @@
-"""Polarised light: its Stokes parameters, and what facets make of them.
+"""Polarised light: its Stokes parameters, and what facets make of them, as of all light that may come in.
 
 Light that travels along `w` is described in a frame of two directions across it, x and y = w times x: x, y and w are
 right-handed. Its parameters are q, the intensity along x less that along y, u, the same in a frame turned by 45
@@ -10,8 +10,10 @@ A facet's own frame has x along the normal of the plane of incidence, before and
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from abc import ABC, abstractmethod
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 from velatura import ops
 from velatura.ops import Value
@@ -19,40 +21,55 @@ from velatura.optics import ggx
 from velatura.optics.fresnel import Complex
 from velatura.optics.ggx import Direction
 
+if TYPE_CHECKING:
+    from typing_extensions import Self
+
 _STRAIGHT = 1e-8  # square of the sine up to which incidence is normal, where any plane is one of incidence
 
 
-@dataclass
-class Polarisation:
-    """Stokes parameters over the intensity, colours, in the frame whose first direction is `x`; see above."""
+class Light(ABC):
+    """Parameters in the frame whose first direction is `x`; see above."""
 
     x: Direction
-    q: Value
-    u: Value
-    v: Value
 
-    def mirrored(self, where: Value) -> Polarisation:
+    @abstractmethod
+    def _turned(self, x: Direction, turn: Callable[[Value, Value, Value], tuple[Value, Value, Value]]) -> Self:
+        """The light in another frame, where `turn` gives q, u and v."""
+
+    @abstractmethod
+    def depolarised(self, w: Direction) -> Self:
+        """The light once something has scattered it along w, and depolarised it."""
+
+    @abstractmethod
+    def share(self, facet: Mueller) -> Value:
+        """Share of the light that a facet sends on."""
+
+    @abstractmethod
+    def sent(self, facet: Mueller) -> Self:
+        """The light that a facet has sent on."""
+
+    def mirrored(self, where: Value) -> Self:
         """The parameters in a mirror in the plane of z where the condition holds: x is turned, and right is left."""
         x = self.x[0], self.x[1], ops.select(where, -self.x[2], self.x[2])
-        return Polarisation(x, self.q, ops.select(where, -self.u, self.u), ops.select(where, -self.v, self.v))
+        return self._turned(x, lambda q, u, v: (q, ops.select(where, -u, u), ops.select(where, -v, v)))
 
     @property
-    def inverted(self) -> Polarisation:
+    def inverted(self) -> Self:
         """The parameters with all directions turned around, of travel too: x and y keep axes, right is left."""
-        return Polarisation(self.x, self.q, -self.u, -self.v)
+        return self._turned(self.x, lambda q, u, v: (q, -u, -v))
 
-    def seen_by(self, into: Callable[[Direction], Direction]) -> Polarisation:
+    def seen_by(self, into: Callable[[Direction], Direction]) -> Self:
         """The parameters in the coordinates that a rotation leads to."""
-        return Polarisation(into(self.x), self.q, self.u, self.v)
+        return self._turned(into(self.x), lambda q, u, v: (q, u, v))
 
-    def along(self, w: Direction, x: Direction) -> Polarisation:
+    def along(self, w: Direction, x: Direction) -> Self:
         """The parameters in the frame of another first direction x across the direction of travel w."""
         cosine, sine = ggx.dot(self.x, x), ggx.dot(ggx.cross(w, self.x), x)
         square = ops.maximum(cosine * cosine + sine * sine, ops.TINY)
         cos_2, sin_2 = (cosine * cosine - sine * sine) / square, 2 * cosine * sine / square
-        return Polarisation(x, cos_2 * self.q + sin_2 * self.u, cos_2 * self.u - sin_2 * self.q, self.v)
+        return self._turned(x, lambda q, u, v: (cos_2 * q + sin_2 * u, cos_2 * u - sin_2 * q, v))
 
-    def at(self, w: Direction, h: Direction) -> Polarisation:
+    def at(self, w: Direction, h: Direction) -> Self:
         """The parameters in the frame of a facet of normal h."""
         s = ggx.cross(w, h)
         square = ggx.dot(s, s)
@@ -60,6 +77,85 @@ class Polarisation:
         scale = 1 / ops.sqrt(ops.maximum(square, _STRAIGHT))
         x, y, z = (ops.select(tilted, scale * new, old) for new, old in zip(s, self.x))
         return self.along(w, (x, y, z))
+
+
+@dataclass
+class Polarisation(Light):
+    """Stokes parameters of light over its intensity, colours."""
+
+    x: Direction
+    q: Value
+    u: Value
+    v: Value
+
+    def _turned(self, x: Direction, turn: Callable[[Value, Value, Value], tuple[Value, Value, Value]]) -> Polarisation:
+        return Polarisation(x, *turn(self.q, self.u, self.v))
+
+    def depolarised(self, w: Direction) -> Polarisation:
+        return unpolarised(w, self.q)
+
+    def share(self, facet: Mueller) -> Value:
+        return 0.5 * ((1 + self.q) * facet.s + (1 - self.q) * facet.p)
+
+    def sent(self, facet: Mueller) -> Polarisation:
+        share = self.share(facet)
+        return Polarisation(
+            self.x, *(ops.divide(part, share) for part in facet.times((1.0, self.q, self.u, self.v))[1:])
+        )
+
+
+Column = Sequence[Value]  # I, Q, U and V
+
+
+@dataclass
+class Transport(Light):
+    """The Mueller matrix of all events on a way, over the product of the shares of unpolarised light that they send on.
+
+    `columns` are what becomes of I, of Q, of U and of V, colours.
+    """
+
+    x: Direction
+    columns: tuple[Column, ...]
+
+    def _turned(self, x: Direction, turn: Callable[[Value, Value, Value], tuple[Value, Value, Value]]) -> Transport:
+        return Transport(x, tuple((i, *turn(q, u, v)) for i, q, u, v in self.columns))
+
+    def depolarised(self, w: Direction) -> Transport:
+        return Transport(horizontal(w), tuple((i, 0.0 * i, 0.0 * i, 0.0 * i) for i, *_ in self.columns))
+
+    def share(self, facet: Mueller) -> Value:
+        return 0.5 * (facet.s + facet.p)
+
+    def sent(self, facet: Mueller) -> Transport:
+        sent = Transport(self.x, tuple(facet.times(column) for column in self.columns))
+        return sent.times(ops.divide(1.0, self.share(facet)))
+
+    def times(self, colour: Value) -> Transport:
+        """The matrix times a colour."""
+        return Transport(self.x, tuple(tuple(colour * part for part in column) for column in self.columns))
+
+    def plus(self, other: Transport) -> Transport:
+        """The sum with a matrix in the same frame."""
+        pairs = zip(self.columns, other.columns)
+        return Transport(self.x, tuple(tuple(map(sum, zip(*columns))) for columns in pairs))
+
+    def joined(self, w: Direction, other: Transport) -> list[Value]:
+        """The matrix, row by row, of this way along w and on by the `other` one, which was followed from its far end
+        and arrives along -w: for light that goes it the other way, the matrix is transposed, and signs of U change."""
+        met = self.along(w, other.x).columns
+        signs = 1.0, 1.0, -1.0, 1.0
+        return [
+            sum(signs[row] * signs[k] * other.columns[row][k] * column[k] for k in range(4))
+            for row in range(4)
+            for column in met
+        ]
+
+
+def all_light(w: Direction, colour: Value) -> Transport:
+    """The matrix of a way along w without events, with channels as those of a colour."""
+    none = 0.0 * colour
+    columns = (tuple(none + (row == column) for row in range(4)) for column in range(4))
+    return Transport(horizontal(w), tuple(columns))
 
 
 def unpolarised(w: Direction, colour: Value) -> Polarisation:
@@ -86,17 +182,16 @@ class Mueller:
     real: Value
     imaginary: Value
 
-    def share(self, light: Polarisation) -> Value:
-        """Share of the light that goes this way."""
-        return 0.5 * ((1 + light.q) * self.s + (1 - light.q) * self.p)
-
-    def applied(self, light: Polarisation) -> Polarisation:
-        """The light that has gone this way."""
-        share = self.share(light)
-        q = 0.5 * ((1 + light.q) * self.s - (1 - light.q) * self.p)
-        u = light.u * self.real - light.v * self.imaginary
-        v = light.u * self.imaginary + light.v * self.real
-        return Polarisation(light.x, *(ops.divide(part, share) for part in (q, u, v)))
+    def times(self, stokes: Sequence[Value]) -> tuple[Value, Value, Value, Value]:
+        """I, Q, U and V of the light that has gone this way."""
+        i, q, u, v = stokes
+        s, p = (i + q) * self.s, (i - q) * self.p
+        return (
+            0.5 * (s + p),
+            0.5 * (s - p),
+            u * self.real - v * self.imaginary,
+            u * self.imaginary + v * self.real,
+        )
 
 
 def mueller(amplitude_s: Complex, amplitude_p: Complex) -> Mueller:

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from velatura import kernel
 from velatura.errors import whole_number
-from velatura.optics.polarisation import horizontal
+from velatura.optics.polarisation import Polarisation, horizontal
 from velatura.reference.layers import WalkedLayers, from_material, zeros
 from velatura.reference.walk import walk
 from velatura.stack import RGB, Address, Material, Stack
@@ -80,7 +80,7 @@ def _part(layers: WalkedLayers, wi: Array, count: int, seed: int, start: int, po
     weight = layers.seen(carried, types.Array3f)
     cut_off = dr.mean(layers.seen(path.weight, types.Array3f) - weight)
     parts = []
-    if path.light is not None:
+    if isinstance(path.light, Polarisation):
         light = path.light.along(path.w, horizontal(path.w))
         parts = [layers.seen(carried * part, types.Array3f) for part in (light.q, light.u, light.v)]
     dr.eval(path.w, weight, path.deepest, cut_off, parts)

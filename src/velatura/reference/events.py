@@ -15,7 +15,7 @@ from velatura import ops
 from velatura.ops import Value
 from velatura.optics import ggx, refraction
 from velatura.optics.ggx import Direction
-from velatura.optics.polarisation import Polarisation, unpolarised
+from velatura.optics.polarisation import Light
 from velatura.reference.layers import WalkedLayers, WalkedSurface, relative_index
 from velatura.reference.metal import mean
 
@@ -36,7 +36,7 @@ class SurfaceMeeting:
     n_out: Value
     wi: Direction
     above: Value
-    light: Polarisation | None = None
+    light: Light | None = None
     reflects: Value = False
     refracts: Value = False
 
@@ -51,6 +51,15 @@ class SurfaceMeeting:
     def shares(self, cosine: Value) -> tuple[Value, Value]:
         """Reflectance and transmittance of a facet."""
         return self.layers.shares(self.j, cosine, self.n_in, self.n_out, self.above)
+
+    def meet(self, i: Direction, h: Direction) -> tuple[tuple[Value, Value], Light | None, Light | None]:
+        """`shares` of a facet of normal h for light from i, both in the frame of the surface, and the light once
+        reflected, or refracted."""
+        surface = self.layers.surface(self.j)
+        light = self.light and self.light.seen_by(surface.into)
+        shares, *sent = self.layers.meet(self.j, i, h, self.n_in, self.n_out, self.above, light)
+        mirrored, refracted = (each and each.seen_by(surface.out_of) for each in sent)
+        return shares, mirrored, refracted
 
 
 @dataclass(frozen=True)
@@ -71,7 +80,7 @@ class ScatteringEvent:
     density_back: Value
     certain: Value
     reverse: Value
-    light: Polarisation | None = None
+    light: Light | None = None
 
 
 def sample(meeting: SurfaceMeeting, carried: Value, u1: Value, u2: Value, u3: Value) -> ScatteringEvent:
@@ -98,16 +107,15 @@ def sample_refraction(meeting: SurfaceMeeting, u1: Value, u2: Value) -> Scatteri
     surface, eta = meeting.layers.surface(meeting.j), meeting.eta
     i = surface.into(meeting.wi)
     h = surface.sample_normal(i, u1, u2)
-    cos_i = ggx.dot(i, h)
     o = refraction.refract(i, h, eta)
     # Weigh
-    _, transmittance = meeting.shares(cos_i)
+    (_, transmittance), _, light = meeting.meet(i, h)
     weight = ops.select(o[2] < 0, transmittance * surface.masking(o), 0.0)
     density, back = _densities(surface, i, h, o, eta)
     density = ops.select(surface.smooth, 1.0, density)
     share = mean(transmittance)
     back = ops.select(surface.smooth, _spread(o, i, 1 / eta), back) * share
-    return ScatteringEvent(surface.out_of(o), weight, False, density, back, density, density * share)
+    return ScatteringEvent(surface.out_of(o), weight, False, density, back, density, density * share, light)
 
 
 def sample_reflection(meeting: SurfaceMeeting, u1: Value, u2: Value) -> ScatteringEvent:
@@ -124,11 +132,11 @@ def _sample_reflection(meeting: SurfaceMeeting, u1: Value, u2: Value) -> Scatter
     i = surface.into(meeting.wi)
     h = surface.sample_normal(i, u1, u2)
     o = ggx.reflect(i, h)
-    reflectance, _ = meeting.shares(ggx.dot(i, h))
+    (reflectance, _), light, _ = meeting.meet(i, h)
     weight = ops.select(o[2] > 0, reflectance * surface.masking(o), 0.0)
     density, back = (ops.select(surface.smooth, 1.0, each) for each in _densities(surface, i, h, o, 1.0))
     share = mean(reflectance)
-    return ScatteringEvent(surface.out_of(o), weight, True, density, back * share, density, density * share)
+    return ScatteringEvent(surface.out_of(o), weight, True, density, back * share, density, density * share, light)
 
 
 def _from_outside(event: ScatteringEvent) -> ScatteringEvent:
@@ -142,9 +150,7 @@ def _sample_interface(meeting: SurfaceMeeting, carried: Value, u1: Value, u2: Va
     i = surface.into(meeting.wi)
     h = surface.sample_normal(i, u1, u2)
     # Choose between reflection and refraction
-    light = meeting.light and meeting.light.seen_by(surface.into)
-    sides = meeting.n_in, meeting.n_out, meeting.above
-    (reflectance, passing), mirrored, refracted = meeting.layers.meet(meeting.j, i, h, *sides, light)
+    (reflectance, passing), mirrored, refracted = meeting.meet(i, h)
     chance = ops.divide(mean(carried * reflectance), mean(carried * (reflectance + passing)))
     chance = ops.select(meeting.refracts, 0.0, ops.select(meeting.opaque | meeting.reflects, 1.0, chance))
     reflected = u3 < chance
@@ -157,7 +163,6 @@ def _sample_interface(meeting: SurfaceMeeting, carried: Value, u1: Value, u2: Va
     certain = ops.select(surface.smooth, ops.select(reflected, 1.0, _spread(i, o, eta)), certain)
     back = ops.select(surface.smooth, 1.0, back)
     light = ops.select_record(reflected, mirrored, refracted)
-    light = light and light.seen_by(surface.out_of)
     wo, share = surface.out_of(o), mean(share)
     return ScatteringEvent(wo, weight, reflected, certain * share, back, certain, back * share, light)
 
@@ -170,11 +175,12 @@ def _evaluate_interface(meeting: SurfaceMeeting, wo: Direction, reflected: Value
     cos_i = ggx.dot(i, h)
     serves = (cos_i > 0) & _same(ggx.dot(o, h) > 0, reflected) & _negate(surface.smooth)
     # Evaluate
-    share = ops.select(reflected, *meeting.shares(ops.maximum(cos_i, 0.0)))
+    shares, mirrored, refracted = meeting.meet(i, h)
+    share, light = ops.select(reflected, *shares), ops.select_record(reflected, mirrored, refracted)
     certain, back = _densities(surface, i, h, o, eta)
     density, reverse = (ops.select(serves, each, 0.0) for each in (certain, back))
     weight, share = share * density * surface.masking(o), mean(share)
-    return ScatteringEvent(wo, weight, reflected, density * share, back, certain, reverse * share)
+    return ScatteringEvent(wo, weight, reflected, density * share, back, certain, reverse * share, light)
 
 
 def _densities(surface: WalkedSurface, i: Direction, h: Direction, o: Direction, eta: Value) -> tuple[Value, Value]:
@@ -193,14 +199,15 @@ def _spread(i: Direction, o: Direction, eta: Value) -> Value:
 def _sample_diffuse(meeting: SurfaceMeeting, u1: Value, u2: Value) -> ScatteringEvent:
     radius, phi, z = ops.sqrt(u1), 2 * pi * u2, ops.sqrt(1 - u1)
     wo = radius * ops.cos(phi), radius * ops.sin(phi), z
-    light = meeting.light and unpolarised(wo, meeting.light.q)
+    light = meeting.light and meeting.light.depolarised(wo)
     density, back = z / pi, meeting.wi[2] / pi
     return ScatteringEvent(wo, meeting.layers.albedo, True, density, back, density, back, light)
 
 
 def _evaluate_diffuse(meeting: SurfaceMeeting, wo: Direction) -> ScatteringEvent:
     density, back = ops.maximum(wo[2], 0.0) / pi, meeting.wi[2] / pi
-    return ScatteringEvent(wo, meeting.layers.albedo * density, True, density, back, density, back)
+    light = meeting.light and meeting.light.depolarised(wo)
+    return ScatteringEvent(wo, meeting.layers.albedo * density, True, density, back, density, back, light)
 
 
 def _with_diffuse_base(

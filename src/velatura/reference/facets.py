@@ -15,7 +15,7 @@ from velatura import ops
 from velatura.ops import Value
 from velatura.optics import ggx, microsurface, refraction
 from velatura.optics.ggx import Direction
-from velatura.optics.polarisation import Polarisation
+from velatura.optics.polarisation import Light, Transport, horizontal
 from velatura.reference import events
 from velatura.reference.events import ScatteringEvent, SurfaceMeeting
 from velatura.reference.metal import mean
@@ -32,8 +32,9 @@ Evaluated = tuple[ScatteringEvent, ...]  # events that add up
 class Flight:
     """Light between facets: its direction of travel, and the rank of its height, both as seen from its own medium.
 
-    Beyond the interface (not `outside`) that is upside down. `weight` and `values` are colours; `light` is the
-    polarisation, None where it is left out.
+    Beyond the interface (not `outside`) that is upside down. `weight` and `values` are colours; `light` is polarised
+    light, None where polarisation is left out. `sent` is the sum of what `values` are the
+    sum of, each with its light, or none.
     """
 
     rng: Any
@@ -44,7 +45,8 @@ class Flight:
     values: list[Value]
     count: Value
     alive: Value
-    light: Polarisation | None
+    light: Light | None
+    sent: list[Transport]
 
 
 def scatter(
@@ -69,10 +71,14 @@ def scatter(
         many = replace(
             many, light=ops.select_record(flight.outside, flight.light, flight.light.inverted).seen_by(surface.out_of)
         )
-    values = []
-    for target, event, later in zip(targets, towards, flight.values):
+    values: list[Evaluated] = []
+    for k, (target, event) in enumerate(zip(targets, towards)):
         first = _weighed(event, event.weight * _unmasked(meeting, *target), False)
-        values.append((ops.select_record(rough, first, event), _weighed(event, later, True)))
+        later = _weighed(event, flight.values[k], True)
+        if flight.sent:
+            sent = flight.sent[k].times(ops.divide(1.0, flight.values[k]))
+            later = replace(later, light=sent.seen_by(surface.out_of))
+        values.append((ops.select_record(rough, first, event), later))
     return ops.select_record(rough, many, once), values, flight.rng
 
 
@@ -95,6 +101,8 @@ def sample_refraction(types: Any, meeting: SurfaceMeeting, rng: Any) -> tuple[Sc
     onward = densities.density_back
     turned = replace(densities, wo=wo, density=onward, density_back=densities.density, certain=onward)
     many = _weighed(turned, ops.select(through, flight.weight, 0.0), flight.count > 1)
+    if flight.light is not None:
+        many = replace(many, light=flight.light.inverted.seen_by(surface.out_of))
     return ops.select_record(rough, many, once), flight.rng
 
 
@@ -114,6 +122,8 @@ def sample_reflection(types: Any, meeting: SurfaceMeeting, rng: Any) -> tuple[Sc
     there = events.evaluate(meeting, wo, True)
     turned = replace(there, density=there.certain, density_back=there.reverse, reverse=there.density)
     many = _weighed(turned, ops.select(flight.outside, flight.weight, 0.0), flight.count > 1)
+    if flight.light is not None:
+        many = replace(many, light=flight.light.seen_by(surface.out_of))
     return ops.select_record(rough, many, once), flight.rng
 
 
@@ -133,6 +143,9 @@ def _fly(
     alpha = surface.alpha_u, surface.alpha_v
     start = surface.into((-meeting.wi[0], -meeting.wi[1], -meeting.wi[2]))
     light = meeting.light and meeting.light.seen_by(surface.into)
+    sent = []
+    if isinstance(light, Transport):
+        sent = [Transport(horizontal(target), light.columns).times(colour) for target in targets]
     flight = Flight(
         rng,
         start,
@@ -143,6 +156,7 @@ def _fly(
         types.UInt32(0),
         types.Bool(active),
         light,
+        sent,
     )
 
     def step(f: Flight) -> tuple[Flight]:
@@ -153,8 +167,11 @@ def _fly(
         # Send light to the targets
         again = f.alive & (f.count > 0)
         for k, target in enumerate(targets):
-            goal = ops.select_record(f.outside, target, _reverse(target))
-            f.values[k] = ops.select(again, f.values[k] + f.weight * _value(meeting, f, i, goal), f.values[k])
+            value, sent = _value(meeting, f, i, target)
+            value = ops.select(again, f.weight * value, 0.0)
+            f.values[k] = f.values[k] + value
+            if isinstance(sent, Transport):
+                f.sent[k] = f.sent[k].plus(sent.along(target, horizontal(target)).times(value))
         # Meet a facet
         h = ggx.sample_visible(i, *alpha, f.rng.next_float32(), f.rng.next_float32())
         sides = _sides(meeting, f.outside)
@@ -185,9 +202,11 @@ def _fly(
     return flight
 
 
-def _value(meeting: SurfaceMeeting, flight: Flight, i: Direction, goal: Direction) -> Value:
-    """Light that a facet met from i scatters along `goal` and out of the interface, f |cos theta_o|."""
+def _value(meeting: SurfaceMeeting, flight: Flight, i: Direction, target: Direction) -> tuple[Value, Light | None]:
+    """Light that a facet met from i scatters along `target` and out of the interface, f |cos theta_o|; also as it is
+    polarised."""
     # Find the facet that serves
+    goal = ops.select_record(flight.outside, target, _reverse(target))
     same_side = goal[2] > 0
     eta = ops.select(same_side, 1.0, _eta(meeting, flight.outside))
     h = refraction.half_vector(i, goal, eta)
@@ -197,11 +216,13 @@ def _value(meeting: SurfaceMeeting, flight: Flight, i: Direction, goal: Directio
     surface = meeting.layers.surface(meeting.j)
     alpha = surface.alpha_u, surface.alpha_v
     sides = _sides(meeting, flight.outside)
-    share = ops.select(same_side, *meeting.layers.shares(meeting.j, ops.maximum(cos_i, 0.0), *sides))
+    shares, mirrored, refracted = meeting.layers.meet(meeting.j, i, h, *sides, flight.light)
+    share, light = ops.select(same_side, *shares), ops.select_record(same_side, mirrored, refracted)
     density = microsurface.visible(i, h, *alpha) * refraction.jacobian(cos_i, cos_o, eta)
     rank = ops.select(same_side, flight.rank, 1 - flight.rank)
     leaves = microsurface.escape(ops.select_record(same_side, goal, _reverse(goal)), rank, *alpha)
-    return share * ops.select(serves, density * leaves, 0.0)
+    sent = light and ops.select_record(flight.outside, light, light.inverted)
+    return share * ops.select(serves, density * leaves, 0.0), sent
 
 
 def _unmasked(meeting: SurfaceMeeting, target: Direction, reflected: Value) -> Value:

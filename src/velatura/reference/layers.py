@@ -13,7 +13,7 @@ from math import pi
 from typing import Any
 
 from velatura import metals, ops
-from velatura.films.of_material import films_of
+from velatura.films.of_material import SENSITIVITIES, films_of
 from velatura.films.polarised import PolarisedFilms, polarised_films
 from velatura.films.reflectance import InterfaceFilms
 from velatura.films.tables import Coated
@@ -22,9 +22,9 @@ from velatura.ops import Value
 from velatura.optics import fresnel, ggx
 from velatura.optics.ggx import Direction
 from velatura.optics.phase import PhaseFunction
-from velatura.optics.polarisation import Mueller, Polarisation, complement, mueller
+from velatura.optics.polarisation import Light, Mueller, complement, mueller
 from velatura.reference.metal import WAVELENGTHS, WalkedMetal
-from velatura.stack import Address, BaseValues, InterfaceValues, Material, SlabValues, srgb_sensitivity
+from velatura.stack import Address, BaseValues, InterfaceValues, Material, SlabValues
 from velatura.stack.chain import chain
 from velatura.stack.values import Pair
 
@@ -95,7 +95,7 @@ class WalkedLayers:
     With `microsurface`, light scatters many times between the facets of a surface. `films` are those on each surface,
     counted from below where the stack is `flipped`. Between media without an interface there is a smooth surface that
     bends no light: `above` are the numbers of other surfaces above each slab. Where a `metal` of measured index lies
-    below, paths carry light of its wavelengths.
+    below, paths carry light of its wavelengths. `light` is that of the material.
     """
 
     base: str
@@ -109,6 +109,7 @@ class WalkedLayers:
     flipped: Value = False
     above: tuple[int, ...] = ()
     metal: WalkedMetal | None = None
+    light: Any = "srgb"
 
     @property
     def count(self) -> int:
@@ -202,6 +203,16 @@ class WalkedLayers:
         """Whether light comes from the side above as films are listed."""
         return above if self.flipped is False else self.flipped ^ above
 
+    @property
+    def polarises(self) -> bool:
+        """Whether matrices of all films are known: not at the wavelengths of a ray, nor of a texture."""
+        known = (isinstance(films, Coated) and films.coating for films in self.films if films)
+        return all(known)
+
+    def _polarised(self, films: InterfaceFilms) -> PolarisedFilms:
+        assert isinstance(films, Coated) and films.coating
+        return polarised_films(films.coating, films.n12 is None, SENSITIVITIES[self.light])
+
     def mueller(self, j: Value, cosine: Value, n_in: Value, n_out: Value, above: Value) -> tuple[Mueller, Mueller]:
         """Mueller matrices of the light that a facet reflects, and refracts: `shares` of polarised light."""
         eta = relative_index(n_in, n_out)
@@ -218,7 +229,7 @@ class WalkedLayers:
                 if not films:
                     return bare
                 assert isinstance(films, Coated)
-                return _polarised(films).dielectric(films.from_rarer(above), cosine, cos_t, eta, n_in)
+                return self._polarised(films).dielectric(films.from_rarer(above), cosine, cos_t, eta, n_in)
 
             each = [matrices(films) for films in self._on_dielectrics]
             reflection, refraction = (self._of_interface(column, j) for column in zip(*each))
@@ -230,7 +241,7 @@ class WalkedLayers:
                 Mueller(*map(self.metal.wide, vars(x).values())) for x in (reflection, refraction)
             )
         elif self.base == "conductor" and (films := self.films[-1]):
-            base = _polarised(films).opaque(cosine, n_in)
+            base = self._polarised(films).opaque(cosine, n_in)
         elif self.base == "conductor":
             base = mueller(*fresnel.conductor_amplitudes(cosine, self.index[-1] / n_in, self.extinction / n_in))
         else:
@@ -249,17 +260,17 @@ class WalkedLayers:
         n_in: Value,
         n_out: Value,
         above: Value,
-        light: Polarisation | None,
-    ) -> tuple[tuple[Value, Value], Polarisation | None, Polarisation | None]:
-        """`shares` of a facet of normal h for light from i, and the light's polarisation once reflected, or refracted;
-        `light` is None where polarisation is left out."""
-        cosine = ggx.dot(i, h)
+        light: Light | None,
+    ) -> tuple[tuple[Value, Value], Light | None, Light | None]:
+        """`shares` of a facet of normal h for light from i, and the light once reflected, or refracted; `light` is None
+        where polarisation is left out."""
+        cosine = ops.maximum(ggx.dot(i, h), 0.0)
         if light is None:
             return self.shares(j, cosine, n_in, n_out, above), None, None
         reflection, refraction = self.mueller(j, cosine, n_in, n_out, above)
         light = light.at((-i[0], -i[1], -i[2]), h)
-        shares = reflection.share(light), refraction.share(light)
-        return shares, reflection.applied(light), refraction.applied(light)
+        shares = light.share(reflection), light.share(refraction)
+        return shares, light.sent(reflection), light.sent(refraction)
 
 
 def from_material(types: Any, material: Material, microsurface: bool) -> WalkedLayers:
@@ -304,12 +315,8 @@ def from_material(types: Any, material: Material, microsurface: bool) -> WalkedL
         tuple(films),
         above=tuple(above),
         metal=metal,
+        light=material.light,
     )
-
-
-def _polarised(films: InterfaceFilms) -> PolarisedFilms:
-    assert isinstance(films, Coated) and films.coating
-    return polarised_films(films.coating, films.n12 is None, srgb_sensitivity)
 
 
 def zeros(material: Material) -> set[Address]:

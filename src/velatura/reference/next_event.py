@@ -26,6 +26,7 @@ from velatura import ops
 from velatura.ops import Value
 from velatura.optics import ggx
 from velatura.optics.ggx import Direction
+from velatura.optics.polarisation import Light
 from velatura.reference import events, facets
 from velatura.reference.events import ScatteringEvent, SurfaceMeeting
 from velatura.reference.layers import WalkedLayers, WalkedSlab, pick
@@ -48,6 +49,7 @@ class WayBack:
     density: Value
     others: Value
     reverse: Value
+    light: Light | None = None
 
 
 @dataclass(frozen=True)
@@ -58,7 +60,8 @@ class WayOut:
     `density` is that of the drawn w. `others`, times the density with which a path would take w, over `density`, is
     the sum of the densities of all strategies that draw more by the path, relative to this one's. `reverse` is the
     density with which a path from outside would draw w, over `density`. `back` are the ways by a reflection, of slab 1
-    and those below it, for paths where `turns`; none where a medium lies outside.
+    and those below it, for paths where `turns`; none where a medium lies outside. `light` is the polarised light that
+    the way, followed from outside, brings into each slab; none where polarisation is left out.
     """
 
     w: tuple[Direction, ...]
@@ -69,6 +72,15 @@ class WayOut:
     reverse: tuple[Value, ...]
     back: tuple[WayBack, ...] = ()
     turns: Value = False
+    light: tuple[Light | None, ...] = ()
+
+    def along(self, slab: Value, back: bool) -> tuple[Direction, Light | None]:
+        """Direction in which light leaves a slab, by the way back or straight, and what the way brings there."""
+        if not back:
+            return _direction(self, slab), pick(self.light, slab)
+        way = _way_back_below(self, slab - 1)
+        x, y, z = way.w
+        return (-x, -y, -z), way.light
 
 
 @dataclass(frozen=True)
@@ -86,18 +98,22 @@ class _Crossing:
     below: Value
 
 
-def way_out(types: Any, layers: WalkedLayers, wo: Direction, rng: Any, turns: Value = False) -> tuple[WayOut, Any]:
+def way_out(
+    types: Any, layers: WalkedLayers, wo: Direction, rng: Any, turns: Value = False, light: Light | None = None
+) -> tuple[WayOut, Any]:
     """Draw a way in from `wo`, which lies above the surface; also the random numbers, advanced.
 
     Args:
         turns: whether the way goes on by a reflection at the last surface; only for paths that come from above.
+        light: that along -wo, where facets polarise it. Reflections between smooth surfaces do not.
     """
+    lights = [light]
     w, density, others, reverse = [wo], [1.0], [0.0], [1.0]
     spread, smooth = [1.0], 1.0
     crossings: list[_Crossing] = []
     for k, surface in enumerate(layers.surfaces):
         indices = layers.index[k], layers.index[k + 1]
-        meeting = SurfaceMeeting(layers, k, *indices, w[k], True)
+        meeting = SurfaceMeeting(layers, k, *indices, w[k], True, lights[k])
         # Reflect between smooth surfaces
         smooth = ops.select(surface.smooth, smooth, 0.0)
         mirrored = smooth * meeting.shares(w[k][2])[0]
@@ -108,6 +124,7 @@ def way_out(types: Any, layers: WalkedLayers, wo: Direction, rng: Any, turns: Va
         # Refract into the next slab
         inward, rng = _refracted(types, meeting, rng)
         w.append((-inward.wo[0], -inward.wo[1], ops.maximum(-inward.wo[2], _GRAZING)))
+        lights.append(inward.light)
         spread.append(spread[k] * w[k][2] / (meeting.eta * meeting.eta * w[k + 1][2]))
         below = transmittance(layers.slabs[k + 1], w[k + 1][2])
         mirrored_below = mirrored
@@ -121,7 +138,8 @@ def way_out(types: Any, layers: WalkedLayers, wo: Direction, rng: Any, turns: Va
         others.append(ops.minimum(rough + more, events.HUGE))
         reverse.append(reverse[k] * ops.divide(inward.reverse, inward.density))
     up, down = ([x * s for x, s in zip(weights, spread)] for weights in _sum_reflections(crossings))
-    out = WayOut(*map(tuple, (w, up, down, density, others, reverse)))
+    each = map(tuple, (w, up, down, density, others, reverse))
+    out = replace(WayOut(*each), light=tuple(lights))
     if turns is False or layers.count == 1 or layers.hazy:
         return out, rng
     back, rng = _way_back(types, layers, out, smooth, rng)
@@ -137,7 +155,7 @@ def _way_back(
     """
     # Reflect at the last surface
     k = layers.count - 1
-    meeting = SurfaceMeeting(layers, k, layers.index[k], layers.index[k + 1], out.w[k], True)
+    meeting = SurfaceMeeting(layers, k, layers.index[k], layers.index[k + 1], out.w[k], True, out.light[k])
     if layers.microsurface:
         turned, rng = facets.sample_reflection(types, meeting, rng)
     else:
@@ -147,12 +165,14 @@ def _way_back(
     # Refract into the slabs above
     for k in range(layers.count - 2, 0, -1):
         x, y, z = back[0].w
-        meeting = SurfaceMeeting(layers, k, layers.index[k + 1], layers.index[k], (-x, -y, z), False)
+        light = back[0].light and back[0].light.mirrored(True)
+        meeting = SurfaceMeeting(layers, k, layers.index[k + 1], layers.index[k], (-x, -y, z), False, light)
         outward, rng = _refracted(types, meeting, rng)
         x, y, z = outward.wo
         passed = transmittance(layers.slabs[k + 1], back[0].w[2])
         below = replace(back[0], carried=back[0].carried * passed)
-        back.insert(0, _after(meeting, replace(outward, wo=(x, y, -z)), below))
+        light = outward.light and outward.light.mirrored(True)
+        back.insert(0, _after(meeting, replace(outward, wo=(x, y, -z), light=light), below))
     return tuple(back), rng
 
 
@@ -175,6 +195,7 @@ def _after(meeting: SurfaceMeeting, event: ScatteringEvent, way: WayBack) -> Way
         event.density,
         ops.minimum(rough + ops.divide(event.density_back, way.density) * way.others, events.HUGE),
         way.reverse * ops.divide(event.reverse, event.density),
+        event.light,
     )
 
 

@@ -12,6 +12,7 @@ import numpy as np
 from velatura import kernel, metals, ops
 from velatura.binding import Asked, Binding, plugin_class
 from velatura.errors import InvalidInput
+from velatura.optics.polarisation import all_light, horizontal
 from velatura.reference import proxy
 from velatura.reference.layers import ALPHA_MIN, WalkedLayers, from_material, relative_index, zeros
 from velatura.reference.metal import WAVELENGTHS
@@ -73,13 +74,15 @@ def make(mi: Any) -> type:
 
 @dataclass(frozen=True)
 class Settings:
-    """How paths walk: properties of the plugin, the least roughness of interfaces, and from either end or from one."""
+    """How paths walk: properties of the plugin, the least roughness of interfaces, from either end or from one, and
+    whether facets polarise light in polarised variants, which needs interfaces that are rough."""
 
     seed: int
     max_depth: int
     microsurface: bool
     least_alpha: float = 0.0
     either_end: bool = False
+    polarised: bool = False
 
     @property
     def facts(self) -> dict[str, str]:
@@ -225,16 +228,42 @@ class WalkedPoint:
         layers = stack.layers(si, active, flipped)
         seen = (begin.x, begin.y, dr.select(flipped, -begin.z, begin.z))
         turns = seen[2] > 0 if either else False
-        out, rng = way_out(mi, layers, (end.x, end.y, dr.abs(end.z)), rng, turns)
         one = layers.start(mi.UnpolarizedSpectrum(1))
-        path = walk(mi, layers, seen, rng, one, active, stack.settings.max_depth, out, self._painted, either_end=either)
-        value = layers.seen(path.value, mi.UnpolarizedSpectrum)
+        leaving = end.x, end.y, dr.abs(end.z)
+        polarised = stack.settings.polarised and mi.is_polarized and layers.polarises
+        light = all_light((-leaving[0], -leaving[1], -leaving[2]), one) if polarised else None
+        out, rng = way_out(mi, layers, leaving, rng, turns, light)
+        depth = stack.settings.max_depth
+        path = walk(mi, layers, seen, rng, one, active, depth, out, self._painted, polarised, either)
         # Turn it around, and energy into radiance
-        value *= dr.select(turned, dr.abs(wo.z) / dr.maximum(dr.abs(wi.z), 1e-7), 1.0)
+        factor = dr.select(turned, dr.abs(wo.z) / dr.maximum(dr.abs(wi.z), 1e-7), 1.0)
         if stack.transmits:
             scale = dr.select(seen[2] > 0, 1.0, relative_index(layers.index[0], layers.index[-1]))
-            value *= dr.select(turned ^ mi.Bool(self.radiance), scale * scale, 1.0)
-        return mi.depolarizer(dr.select(active, value, 0))
+            factor *= dr.select(turned ^ mi.Bool(self.radiance), scale * scale, 1.0)
+        values = [dr.select(active, factor * layers.seen(x, mi.UnpolarizedSpectrum), 0) for x in path.value]
+        return self._matrix(values, wo, turned, flipped) if polarised else mi.depolarizer(values[0])
+
+    def _matrix(self, parts: list[Any], wo: Any, turned: Any, flipped: Any) -> Any:
+        """Mueller matrix in the frames of the renderer, by its `parts` row by row, of light that walks in.
+
+        Where the walk is `turned`, it came from `wo`; where it is `flipped`, its coordinates are upside down.
+        """
+        import drjit as dr
+
+        mi = self.stack.mi
+        # Light walks in from the side from which the renderer has it come, or the other way
+        other_way = turned ^ mi.Bool(self.radiance)
+        mirrored, back = (1.0, 1.0, -1.0, -1.0), (1.0, 1.0, -1.0, 1.0)
+        matrix = mi.Spectrum(0.0)
+        for row in range(4):
+            for column in range(4):
+                part = dr.select(other_way, back[row] * back[column] * parts[4 * column + row], parts[4 * row + column])
+                matrix[row, column] = part * dr.select(flipped, mirrored[row] * mirrored[column], 1.0)
+        # From frames along the surface
+        into, away = (wo, self.si.wi) if self.radiance else (self.si.wi, wo)
+        before, after = (mi.Vector3f(*horizontal(tuple(w))) for w in (into, away))
+        basis = mi.mueller.stokes_basis
+        return mi.mueller.rotate_mueller_basis(matrix, -into, before, basis(-into), away, after, basis(away))
 
     def pdf(self, wo: Any, active: Any) -> Any:
         import drjit as dr

@@ -6,6 +6,7 @@ UInt32 and Bool.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from math import pi
 from typing import Any
@@ -15,9 +16,9 @@ from velatura.ops import Value
 from velatura.optics import ggx
 from velatura.optics.ggx import Direction
 from velatura.optics.phase import deflect
-from velatura.optics.polarisation import Polarisation, unpolarised
+from velatura.optics.polarisation import Light, Transport, all_light, unpolarised
 from velatura.reference import events, facets
-from velatura.reference.events import SurfaceMeeting
+from velatura.reference.events import ScatteringEvent, SurfaceMeeting
 from velatura.reference.layers import WalkedLayers, pick
 from velatura.reference.metal import is_colour, mean
 from velatura.reference.next_event import (
@@ -38,12 +39,12 @@ ROULETTE = 0.25  # a path that carries less than this survives by chance, and ca
 class Path:
     """The state of the walk before an event: at the surface ahead, or `inside` a medium.
 
-    `w` is the direction of travel in slab `slab`; `height` is measured downwards, in depths of the slab; `weight` and
-    `value` are colours. `smooth`: only smooth surfaces were met so far; `painted`: the diffuse base was among them.
-    `density` and `chain` weigh the strategies of `next_event`, where `value` comes from. So do `backward` and
-    `straight` those of paths from the other end, None where there are none: over the density of what was drawn, the sum
-    of theirs, and while a way could have drawn all events its density. `light` is the polarisation along `w`, None
-    where it is left out.
+    `w` is the direction of travel in slab `slab`; `height` is measured downwards, in depths of the slab; `weight` is a
+    colour, and so is the only one of `value`, or each of the 16 of a Mueller matrix, row by row. `smooth`: only smooth
+    surfaces were met so far; `painted`: the diffuse base was among them. `density` and `chain` weigh the strategies of
+    `next_event`, where `value` comes from. So do `backward` and `straight` those of paths from the other end, None
+    where there are none: over the density of what was drawn, the sum of theirs, and while a way could have drawn all
+    events its density. `light` is the polarised light along `w`, None where polarisation is left out.
     """
 
     rng: Any
@@ -59,8 +60,8 @@ class Path:
     alive: Value
     density: Value
     chain: Value
-    value: Value
-    light: Polarisation | None
+    value: list[Value]
+    light: Light | None
     backward: Value | None = None
     straight: Value | None = None
 
@@ -87,8 +88,9 @@ def walk(
         colour: what a path carries at first, all channels 1.
         out: the way out that every event is connected to; the paths then gather the BSDF's `value` for it.
         painted: gathered is from paths that the diffuse base has scattered, from all others (False), or both (None).
-        polarised: whether the light, unpolarised at first, is polarised by facets; not together with `out`. Media
-            depolarise what they scatter, since their phase function has no Mueller matrix, and so does a diffuse base.
+        polarised: whether facets polarise the light, which is unpolarised at first; with an `out` that is polarised,
+            the value is a Mueller matrix, for frames whose x is `horizontal` at both ends. Media depolarise what they
+            scatter, since their phase function has no Mueller matrix, and so does a diffuse base.
         either_end: whether half of all paths, by chance, are to be followed from the other end: with `wi` and `out`
             exchanged. The value is then the mean over both.
 
@@ -98,10 +100,13 @@ def walk(
     import drjit as dr
 
     # Enter
-    below = wi[2] < 0
+    below, w = wi[2] < 0, (-wi[0], -wi[1], -wi[2])
+    light: Light | None = None
+    if polarised:
+        light = unpolarised(w, colour) if out is None else all_light(w, colour)
     path = Path(
         rng=rng,
-        w=(-wi[0], -wi[1], -wi[2]),
+        w=w,
         slab=ops.select(below, types.UInt32(layers.count), types.UInt32(0)),
         inside=types.Bool(False),
         height=types.Float(0),
@@ -113,8 +118,8 @@ def walk(
         alive=types.Bool(active),
         density=types.Float(1),
         chain=types.Float(0),
-        value=colour * 0,
-        light=unpolarised((-wi[0], -wi[1], -wi[2]), colour) if polarised else None,
+        value=[colour * 0 for _ in range(16 if polarised and out is not None else 1)],
+        light=light,
         backward=types.Float(0) if either_end else None,
         straight=types.Float(1) if either_end else None,
     )
@@ -162,16 +167,10 @@ def _scatter(types: Any, layers: WalkedLayers, path: Path, out: WayOut | None, p
         path.painted |= layers.is_base(j) & (path.inside ^ True)
     # Gather what leaves from here
     if out is not None:
-        gathered = sum(connect_surface(meeting, event, out, path, down) for event in towards[0])
-        if layers.scatters:
-            gathered = ops.select(path.inside, connect_medium(layers, out, path), gathered)
         kept = True if painted is None else path.painted ^ (not painted)
-        path.value += ops.select(kept, path.weight * gathered, 0.0)
+        _gather(meeting, towards[0], out, path, down, kept, back=False)
     if out is not None and out.back and (painted is not False or layers.base != "diffuse"):
-        gathered = sum(connect_back(meeting, event, out, path, down) for event in towards[1])
-        if layers.scatters:
-            gathered = ops.select(path.inside, connect_medium_back(layers, out, path), gathered)
-        path.value += path.weight * gathered
+        _gather(meeting, towards[1], out, path, down, True, back=True)
     # Turn
     z = onward.wo[2]
     turned: Direction = (onward.wo[0], onward.wo[1], ops.select(down, z, -z))
@@ -197,7 +196,7 @@ def _scatter(types: Any, layers: WalkedLayers, path: Path, out: WayOut | None, p
         reverse, certain = ops.select(path.inside, density, reverse), ops.select(path.inside, 0.0, certain)
         chain = ops.select(path.inside, 1.0, chain)
         slab = ops.select(path.inside, path.slab, slab)
-        light = light and ops.select_record(path.inside, unpolarised(turned, path.weight), light)
+        light = path.light and ops.select_record(path.inside, path.light.depolarised(turned), light)
     path.smooth &= (rough | path.inside) ^ True
     path.w, path.slab, path.light = ggx.normalize(turned), slab, light
     path.density, path.chain = density, ops.minimum(chain, events.HUGE)
@@ -207,6 +206,37 @@ def _scatter(types: Any, layers: WalkedLayers, path: Path, out: WayOut | None, p
         path.straight = ops.minimum(path.straight * ops.divide(certain, density), events.HUGE)
     path.weight = path.weight * weight
     path.deepest = ops.maximum(path.deepest, slab)
+
+
+def _gather(
+    meeting: SurfaceMeeting,
+    events: Sequence[ScatteringEvent],
+    out: WayOut,
+    path: Path,
+    down: Value,
+    kept: Value,
+    back: bool,
+) -> None:
+    """Add what paths send along the way out, or `back` to the last surface, where it is `kept`; at a surface by events
+    that add up."""
+    layers, at_surface, in_medium = meeting.layers, connect_surface, connect_medium
+    if back:
+        at_surface, in_medium = connect_back, connect_medium_back
+    slab = ops.select(path.inside, path.slab, meeting.j + back)
+    for n, event in enumerate(events):
+        gathered, light = at_surface(meeting, event, out, path, down), event.light and event.light.mirrored(down ^ True)
+        if layers.scatters:
+            gathered = ops.select(path.inside, in_medium(layers, out, path) if n == 0 else 0.0, gathered)
+        gathered = path.weight * ops.select(kept, gathered, 0.0)
+        if path.light is None:
+            path.value[0] += gathered
+            continue
+        w, way = out.along(slab, back)
+        if layers.scatters:
+            light = ops.select_record(path.inside, path.light.depolarised(w), light)
+        assert isinstance(light, Transport) and isinstance(way, Transport)
+        for k, part in enumerate(light.joined(w, way)):
+            path.value[k] += gathered * part
 
 
 def _roulette(path: Path) -> None:
