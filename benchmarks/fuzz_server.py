@@ -158,7 +158,8 @@ def edited(minutes: float, seed: int) -> list[str]:
             hands.reload()
             memories.append(memory(server.process.pid))
         heaps, failures = hands.outcome.heaps, hands.outcome.failures
-        pages = f"page {heaps[0]:.0f} to {max(heaps):.0f} MB, server {memories[0]:.0f} to {max(memories):.0f} MB"
+        each = ", ".join(f"{x:.0f}" for x in memories)
+        pages = f"page {heaps[0]:.0f} to {max(heaps):.0f} MB, server {each} MB"
         row(f"{len(hands.outcome.edits)} edits, {len(heaps)} looks", f"{len(failures)} failed; {pages}")
         grown = max(heaps) > HEAP_MB or max(memories) - memories[0] > GROWN_MB
         return failures + [f"memory grows: {pages}"] * grown

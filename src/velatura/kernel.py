@@ -21,6 +21,7 @@ import subprocess
 import sys
 import tempfile
 import threading
+import time
 import traceback
 from collections.abc import Callable, Iterator
 from contextvars import ContextVar
@@ -40,11 +41,13 @@ Factory = Callable[[ModuleType], type]
 TRUSTED_LLVM = 19
 
 MUCH = 32 << 20  # bytes of Dr.Jit at once, from which its freed memory is returned
+TRIMMED = 10  # seconds from one return of the C library's freed memory to the next
 
 _MINIMUM = "import drjit, drjit.llvm as llvm; print(drjit.minimum(llvm.Float([1, 2]), 1.5))"
 
 _factories: dict[str, Factory] = {}
 _registered: set[tuple[str, str]] = set()
+_trimmed = 0.0  # when the C library's freed memory was returned
 _threads: int | None = None  # of Dr.Jit, None for as many as it likes
 _compiled_first = ContextVar("compiled_first", default=False)
 
@@ -81,6 +84,18 @@ class Exclusive(contextlib.ContextDecorator):
             self._depth -= 1
             if not self._depth:
                 self._owner = None
+            self._lock.release()
+
+    @contextlib.contextmanager
+    def at_once(self) -> Iterator[bool]:
+        """Hold the lock in a block unless another thread has it; whether it is held. Never waits."""
+        if not self._lock.acquire(blocking=False):
+            yield False
+            return
+        try:
+            with self:
+                yield True
+        finally:
             self._lock.release()
 
     def drop(self, thing: Any) -> None:
@@ -164,16 +179,28 @@ def numbers(value: Any) -> list[float]:
 
 
 def return_memory() -> None:
-    """Return to the system what Dr.Jit keeps of freed memory, if it has held `MUCH` at once since the last time.
+    """Return freed memory to the system: what the C library keeps of it, once in `TRIMMED` seconds, and what Dr.Jit
+    keeps, if it has held `MUCH` at once since the last time.
 
-    Dr.Jit keeps all of it, by size, for what may need as much again.
+    The C library keeps it for each thread, Dr.Jit all of it by size, for what may need as much again.
     """
+    global _trimmed
+    if time.monotonic() > _trimmed + TRIMMED:
+        _trimmed = time.monotonic()
+        if trim := _malloc_trim():
+            trim(0)
     if not _drjit.cache_info().currsize:
         return
     dr = _drjit()
     if dr.detail.malloc_watermark(dr.JitBackend.LLVM) > MUCH:
         dr.flush_malloc_cache()
         dr.detail.malloc_clear_statistics()
+
+
+@functools.cache
+def _malloc_trim() -> Callable[[int], int] | None:
+    """The function of glibc; None where the C library is another one."""
+    return getattr(ctypes.CDLL(None), "malloc_trim", None) if sys.platform == "linux" else None
 
 
 # LLVM

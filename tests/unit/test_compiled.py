@@ -2,6 +2,7 @@
 
 import gc
 from collections.abc import Iterator
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -89,6 +90,22 @@ def test_one_thread_takes_as_many_sources_as_dr_jit_s_vectors_hold() -> None:
         dr.eval(dr.arange(dr.llvm.UInt32, 3) * 5)
         written = dr.kernel_history([dr.KernelType.JIT])[-1]["ir"].getvalue()
     assert f"<{kernel.vector_width()} x i32>" in written
+
+
+def test_kernels_are_released_once_many_are_unused(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Unless another thread works with Mitsuba; and then kernels give the same as before."""
+    by_kernels(monkeypatch)
+    monkeypatch.setattr(compiled, "UNUSED", 1)
+    monkeypatch.setattr(compiled, "KERNELS", 1)
+    compiled.release_kernels()
+    (sums, *_), _ = (compiled.over(function, SOURCES, SAMPLES, numbers(where), ROWS) for where in (None, "elsewhere"))
+    with ThreadPoolExecutor(1) as other:
+        with kernel.exclusive:
+            other.submit(compiled.release_kernels).result()
+        assert len(compiled._kernels) == 1
+        other.submit(compiled.release_kernels).result()
+    assert not compiled._kernels
+    assert compiled.over(function, SOURCES, SAMPLES, numbers(), ROWS)[0] == pytest.approx(sums, abs=0)
 
 
 def read(sources: Any, samples: Any, numbers: Any) -> Found:

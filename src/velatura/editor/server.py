@@ -8,6 +8,7 @@ import functools
 import json
 import logging
 import socket
+import sys
 import tempfile
 import threading
 import webbrowser
@@ -195,6 +196,8 @@ def _answer(verb: Verb, body: Callable[[], Body]) -> tuple[int, str]:
         return 409 if isinstance(error, Conflict) else 422, _error(str(error))
     finally:
         kernel.return_memory()
+        if compiled := sys.modules.get("velatura.renderer.compiled"):  # which loads SciPy
+            compiled.release_kernels()
 
 
 def _text(answer: Answer) -> str:

@@ -39,10 +39,12 @@ SHARED = 2_000_000  # values at a time, from which several threads run a kernel;
 BLOCK = 1 << 15  # values at a time, which a processor's cache holds
 COLOURS = 3
 KERNELS = 64  # kinds whose launches are kept
+UNUSED = 256  # kinds whose launches were kept, from which their kernels are released
 SIZES = 16  # of each: which numbers of sources, samples and rows are alike
 
 _asked: Counter[Hashable] = Counter()  # values so far, by kind
 _kernels: OrderedDict[Hashable, Any] = OrderedDict()
+_unused = 0  # kinds
 _launching = Lock()
 
 
@@ -189,6 +191,7 @@ def _compiled(
     rows: int,
 ) -> tuple[Array, Array, list[Array]]:
     """One kernel for all values: numbers are read from an array, so that others need no kernel of their own."""
+    global _unused
     import drjit as dr
 
     def array(values: Any) -> Any:
@@ -209,6 +212,7 @@ def _compiled(
                 _mark(kind).touch()
             if len(_kernels) > KERNELS:
                 _kernels.popitem(last=False)
+                _unused += 1
         _kernels.move_to_end(kind)
         of_kind = _kernels[kind]
         found = dr.opaque(module.Float64, 0.0, max(sum(of_kind.counts), 1) * width)
@@ -224,6 +228,23 @@ def _compiled(
             light = np.concatenate([x.numpy().reshape(rows + 1, width, -1) for x in parts], axis=-1)
             lights.append(np.moveaxis(light[..., : values * waves], -1, 0).reshape(values, waves, rows + 1, width))
     return totals, greatest, lights
+
+
+def release_kernels() -> None:
+    """Release all kernels of Dr.Jit, which keeps each one, if many serve no kind that is kept. Those that are asked for
+    again are read from its cache on disk. Nothing happens while another thread works with Mitsuba."""
+    global _unused
+    import drjit as dr
+
+    if _unused < UNUSED:
+        return
+    with kernel.exclusive.at_once() as alone:
+        if alone:
+            with _launching:
+                dr.sync_thread()
+                _kernels.clear()  # launches need the kernels that they have recorded
+                dr.flush_kernel_cache()
+                _unused = 0
 
 
 def _kernel(
