@@ -32,8 +32,8 @@ from velatura.version import __version__
 
 Array = NDArray[Any]
 
-MANY = 50_000  # values of a kind, about half as long as a kernel of it takes to compile where none is kept on disk
-MANY_DEPOSITED = 150_000  # likewise of kinds with light that falls on rows, whose kernels are longer
+MANY = 250_000  # values of a kind, about half as long as a kernel of it takes to compile where none is kept on disk
+MANY_DEPOSITED = 400_000  # likewise of kinds with light that falls on rows, whose kernels are longer
 LEAST = 2_000  # values at a time: for fewer, a kernel takes longer to launch than NumPy to run
 SHARED = 2_000_000  # values at a time, from which several threads run a kernel; see `_lanes`
 BLOCK = 1 << 15  # values at a time, which a processor's cache holds
