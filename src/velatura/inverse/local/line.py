@@ -73,14 +73,14 @@ class Line:
         if not space.slow:
             correction = _Correction.none(space, x)
             x, _ = self._followed(space, x, correction, MET)
-            return self._reached(x, space.read(x[:, None])[:, 0], correction)
+            return self._bounded(self._reached(x, space.read(x[:, None])[:, 0]), correction)
         adder, value, trust = space.quickly, self.start.reading.value, np.inf
         centre = _Correction.none(space, x).at(x, value, adder.read(x[:, None])[:, 0])
-        best, last, settled = self._reached(x, value, centre), np.inf, False
+        best, last, settled = (self._reached(x, value), centre), np.inf, False
         if thorough:
             moving = np.setdiff1d(np.arange(len(x)), [*self.held, *self._resting]).astype(int)
             if 2 * len(moving) > readings:
-                return best
+                return self._bounded(*best)
             centre, trust, readings = centre.measured(space, moving), TRUST, readings - len(moving)
         correction = centre
         for _ in range(readings):
@@ -90,7 +90,7 @@ class Line:
             missed, change = (self._apart(value, of) for of in (correction.value_of(x, near), before))
             limited = bool(np.any(np.abs(x - correction.x) > LIMIT * trust * units(correction.x)))
             correction = correction.at(x, value, near)
-            best = max(best, self._reached(x, value, correction), key=self._worth)
+            best = max(best, (self._reached(x, value), correction), key=lambda each: self._worth(each[0]))
             settled = max(missed, nearly) < self.enough and not limited
             astray = missed > (ASTRAY if thorough else max(FOLLOWED, SLOWLY * last))
             if settled or (astray and not thorough):
@@ -100,7 +100,7 @@ class Line:
             elif missed < max(FOLLOWED, GOOD * change):
                 trust = 2 * trust
             centre, last = correction, missed
-        return dataclasses.replace(best, settled=settled)
+        return dataclasses.replace(self._bounded(*best), settled=settled)
 
     def _apart(self, a: Array, b: Array) -> float:
         """The largest difference of two readings."""
@@ -184,12 +184,15 @@ class Line:
         part = float(gone[counted] @ way[counted]) / far if far > MET**2 else 1.0
         return part, float(np.abs((gone - part * way)[counted]).max())
 
-    def _reached(self, x: Array, value: Array, correction: _Correction) -> Reached:
+    def _reached(self, x: Array, value: Array) -> Reached:
         part, off = self.placed(value)
-        way = self._way[self.start.space.counted]
-        point = Point(self.start.space, x, Reading(value, np.empty((len(value), 0))))
-        there = abs(1 - part) * float(np.abs(way).max(initial=0.0)) < 10 * self.enough
-        return Reached(point, part, off, None if there else self._bound(x, correction))
+        return Reached(Point(self.start.space, x, Reading(value, np.empty((len(value), 0)))), part, off, None)
+
+    def _bounded(self, reached: Reached, correction: _Correction) -> Reached:
+        """A point with the bound there, unless it is the end of the line."""
+        way = float(np.abs(self._way[self.start.space.counted]).max(initial=0.0))
+        there = abs(1 - reached.part) * way < 10 * self.enough
+        return reached if there else dataclasses.replace(reached, bound=self._bound(reached.point.x, correction))
 
     def _bound(self, x: Array, correction: _Correction) -> Bound:
         """The bound that keeps a point from going further: the one that it would leave with the steepest gain."""
