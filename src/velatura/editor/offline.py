@@ -1,6 +1,6 @@
 """The editor as a folder of files that any web server can host: the page, and the answers that it needs of Python.
 
-Answers are those of the verbs of `velatura.editor.service`, worked out once, each in a file: gzip, JSON inside. Shaders
+Answers are those of the verbs of `velatura.editor.service`, worked out once, each in a file of `packing.py`. Shaders
 are those of all orders of a few layers, in closed form, whose values the page sets; presets lie there solved as well.
 The page finds them by `page/offline.js`.
 """
@@ -9,9 +9,7 @@ from __future__ import annotations
 
 import functools
 import gc
-import gzip
 import itertools
-import json
 import multiprocessing
 import os
 import shutil
@@ -19,11 +17,12 @@ import tempfile
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from concurrent.futures import ProcessPoolExecutor
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 from velatura import files
 from velatura.editor import bundle
 from velatura.editor.messages import Answer, document
+from velatura.editor.packing import numbered, packed
 from velatura.editor.service import ENVIRONMENTS, VERBS
 from velatura.editor.shading import in_closed_form, pattern
 from velatura.errors import InvalidInput
@@ -45,11 +44,11 @@ _MARK = '<html lang="en">', f'<html lang="en" data-answers="{DATA}/">'
 
 class Made(NamedTuple):
     """Contents of files, by their places in the folder; the names of tables that shaders in them look up; and the names
-    of a model and of an order of layers, with the shader of both that is exported."""
+    of a model and of an order of layers, with the shaders of both: that which is drawn, and that which is exported."""
 
     contents: dict[str, bytes]
     looked_up: frozenset[str] = frozenset()
-    exported: tuple[str, str, Answer] | None = None
+    shaders: tuple[str, str, Answer, Answer] | None = None
 
 
 class Order(NamedTuple):
@@ -158,16 +157,24 @@ def _write(
     refusals = _refusals(layers)
     put(_common(refusals, models))
     tasks = _tasks([order for order, refusal in refusals.items() if not refusal], models)
-    looked_up, exported = set[str](), dict[str, dict[str, Answer]]()
+    looked_up = set[str]()
+    lines: dict[str, dict[str, dict[str, int]]] = {
+        kind: {model.name: {} for model in models} for kind in ("drawn", "glsl")
+    }
+    exported: dict[str, dict[str, Answer]] = {model.name: {} for model in models}
     for done, made in enumerate(_all_made(tasks), 1):
         put(made.contents)
         looked_up |= made.looked_up
-        if made.exported:
-            model, order, answer = made.exported
-            exported.setdefault(model, {})[order] = answer
+        if made.shaders:
+            model, order, drawn, written = made.shaders
+            by_lines = {**drawn, "text": numbered(drawn["text"], lines["drawn"][model])}
+            put({f"{DATA}/shader/{model}/{order}.pack": packed(by_lines)})
+            exported[model][order] = {**written, "text": numbered(written["text"], lines["glsl"][model])}
         if progress:
             progress(done, len(tasks))
-    put({f"{DATA}/glsl/{model}.pack": packed(_by_lines(answers)) for model, answers in exported.items()})
+    for model, texts in exported.items():
+        put({f"{DATA}/lines/{model}.pack": packed(list(lines["drawn"][model]))})
+        put({f"{DATA}/glsl/{model}.pack": packed({"lines": list(lines["glsl"][model]), "texts": texts})})
     put(_tables(looked_up))
     return sizes
 
@@ -246,21 +253,10 @@ def _shader(model: str, order: Order) -> Made:
     exported = {"text": headed(written.text), "tables": ",".join(written.looked_up) or None, "costs": costs}
     names = [*written.looked_up, *_looked_up(drawn)]
     return Made(
-        {f"{DATA}/shader/{model}/{order.name}.pack": packed(drawn)},
+        {},
         frozenset(filter(None, names)),
-        (model, order.name, exported),
+        (model, order.name, drawn, exported),
     )
-
-
-def _by_lines(answers: Mapping[str, Answer]) -> Answer:
-    """Texts that have most of their lines in common: all lines, and by name each text as their numbers."""
-    numbers: dict[str, int] = {}
-
-    def numbered(text: str) -> list[int]:
-        return [numbers.setdefault(line, len(numbers)) for line in text.split("\n")]
-
-    texts = {name: {**answer, "text": numbered(answer["text"])} for name, answer in answers.items()}
-    return {"lines": list(numbers), "texts": texts}
 
 
 def _looked_up(drawn: Answer) -> list[str]:
@@ -293,8 +289,3 @@ def _coated(model: Model, name: str) -> Made:
 
 def _tables(names: Iterable[str]) -> dict[str, bytes]:
     return {f"{DATA}/table/{name}.pack": packed(VERBS["table"]({"name": name})) for name in names}
-
-
-def packed(answer: Any) -> bytes:
-    """An answer as a file holds it."""
-    return gzip.compress(json.dumps(answer, allow_nan=False, separators=(",", ":")).encode(), mtime=0)

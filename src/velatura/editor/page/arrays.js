@@ -9,14 +9,25 @@ const TYPES = {
 };
 
 /**
- * An array from {dtype, shape, data in base64}, flat, or as it is from {array, shape}; its shape beside it.
+ * An array from {dtype, shape, data in base64}, flat, or as it is from {array, shape}; its shape beside it. `planes` in the place of
+ * the data have the bytes of the same place of all numbers one after another, from the last place; the lowest that are left out are 0.
  * @returns {{array: ArrayBufferView, shape: number[]}}
  */
-export function decode({ dtype, shape, data, array = null }) {
+export function decode({ dtype, shape, data, planes, array = null }) {
   if (array) return { array, shape };
   const type = TYPES[dtype];
   if (!type) throw new Error(`an array of ${dtype}, which is none of ${Object.keys(TYPES).join(', ')}`);
-  return { array: new type(bytesOf(data).buffer), shape };
+  if (planes === undefined) return { array: new type(bytesOf(data).buffer), shape };
+  return { array: interleaved(bytesOf(planes), new type(shape.reduce((all, length) => all * length, 1))), shape };
+}
+
+/** Fills an array of numbers from the planes of their bytes. */
+function interleaved(planes, array) {
+  const { length, BYTES_PER_ELEMENT: size } = array, bytes = new Uint8Array(array.buffer);
+  const first = size - planes.length / Math.max(length, 1);
+  for (let place = first; place < size; place++)
+    for (let k = 0, from = (place - first) * length; k < length; k++) bytes[size * k + place] = planes[from + k];
+  return array;
 }
 
 /** Of base64; older browsers have no function for it. */

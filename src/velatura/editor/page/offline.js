@@ -3,11 +3,11 @@
 
 import { decode } from './arrays.js';
 import { Offline, Refused } from './connection.js';
+import { textOf, unpacked } from './packing.js';
 import { Recent } from './recent.js';
 import { check } from './state/check.js';
 import { flat, stateOf, variantOf } from './state/material.js';
 import { contentsOf } from './state/picture.js';
-import { through } from './state/share.js';
 
 const KEPT = 64; // answers
 const WIDTH = 1024; // texels in a line of tables
@@ -26,7 +26,7 @@ function texelsOf({ array, shape }) {
 /** A client of the files in a folder: `call(verb, body)`, and `lacks(name)`, why a verb or another thing is not there, or ''. */
 export async function connectFiles(folder) {
   const kept = new Recent(KEPT);
-  const load = (name) => kept.once(name, () => unpacked(`${folder}${name}.pack`));
+  const load = (name) => kept.once(name, () => fetched(`${folder}${name}.pack`));
   const session = await load('session');
   const { orders } = session;
 
@@ -55,11 +55,17 @@ export async function connectFiles(folder) {
   async function shader({ material, model, switches = {}, coarse = false }) {
     if (Object.keys(switches).length) throw refused('Switches of a model need Python: velatura edit.');
     const order = orderOf(material), films = filmsOf(material);
-    const found = await load(films ? coated(model, films, order) : `shader/${model}/${order}`);
+    const found = films ? await load(coated(model, films, order)) : await plain(model, order);
     if (found.refused) throw refused(found.refused);
     const preset = session.presets.find((known) => isSame(known.material, material));
     if (found.closed_form && preset && !coarse) return load(`solved/${model}/${preset.name}`);
     return { ...found, values: contentsOf(found, read(material), session).values };
+  }
+
+  /** The shader of an order of layers, whose lines it has in common with others. */
+  async function plain(model, order) {
+    const [found, lines] = await Promise.all([load(`shader/${model}/${order}`), load(`lines/${model}`)]);
+    return { ...found, text: textOf(found.text, lines) };
   }
 
   /** The name of a material in closed form that has the films of a preset. Raises Refused where none has them. */
@@ -91,7 +97,7 @@ export async function connectFiles(folder) {
     const values = flat(read(material), session);
     const put = (line, begin, place) => `${begin}${literal(values[place.replace('.', '_')], line.includes('vec3'))};`;
     const beside = key && { '.tables.bin': (await tables({ key })).texture };
-    const written = text.map((number) => lines[number]).join('\n');
+    const written = textOf(text, lines);
     const filled = written.replace(/^( *m\.([\w.]+) = ).*;$/gm, put);
     return { text: filled, ending: `.${to}`, beside: beside ?? {}, costs };
   }
@@ -124,13 +130,12 @@ export async function connectFiles(folder) {
 const refused = (message) => new Refused(message, 422);
 
 /** What is in a file of an answer. */
-async function unpacked(address) {
+async function fetched(address) {
   const response = await fetch(address).catch(() => {
     throw new Offline();
   });
   if (!response.ok) throw new Error(`${address}: not found`);
-  const bytes = await through(new DecompressionStream('gzip'), await response.arrayBuffer());
-  return JSON.parse(new TextDecoder().decode(bytes));
+  return unpacked(await response.arrayBuffer());
 }
 
 function parsed(text, file) {
