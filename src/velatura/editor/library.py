@@ -1,4 +1,4 @@
-"""What the library of the page keeps of the materials of a folder beside them: tags, and a small picture of each."""
+"""Tags and small pictures of the materials of a folder, which the library of the page keeps beside them."""
 
 from __future__ import annotations
 
@@ -48,7 +48,7 @@ class Thumbnail(Parameter):
         return value
 
 
-#: What is kept of a material.
+#: What is kept of a material, by its keys.
 KEYS: dict[str, Parameter] = {"tags": Tags("of a material"), "thumbnail": Thumbnail("of a material")}
 
 
