@@ -549,7 +549,7 @@ def test_live_calls_are_answered(port: int) -> None:
         socket.send(b"{}")
         assert json.loads(socket.recv(10)) == {"id": None, "error": "a message must be text"}
         socket.send('{"id": "\\ud800", "verb": "list"}')
-        assert json.loads(socket.recv(10)) == {"id": "\ud800", "answer": {"files": [], "textures": []}}
+        assert json.loads(socket.recv(10)) == {"id": "\ud800", "answer": {"files": [], "textures": [], "kept": {}}}
 
 
 def test_of_a_burst_the_first_and_the_last_are_answered(here: Path, monkeypatch: pytest.MonkeyPatch) -> None:
