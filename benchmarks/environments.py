@@ -1,10 +1,10 @@
 """Balls that `--to three` draws by prefiltered environments, against means over samples of the model.
 
-three.js draws in headless Chromium, NumPy the samples. For each preset and environment: the root mean square of the
-difference as displays have it, sRGB from 0 to 1, with the exposure that brings the mean to .25. Noise of the samples
-is in it. Prints the table of docs/how-to/engines.md.
+three.js draws in headless Chromium, NumPy the samples, as many of the model's as of the environment's. For each preset
+and environment: the root mean square of the difference as displays have it, sRGB from 0 to 1, with the exposure that
+brings the mean to .25. Noise of the samples is in it. Prints the table of docs/how-to/engines.md.
 
-    python benchmarks/environments.py [--presets bare-gold,...] [--environments studio,sunset] [--samples 2048]
+    python benchmarks/environments.py [--presets bare-gold,...] [--environments studio,...] [--samples 768]
 """
 
 from __future__ import annotations
@@ -39,7 +39,9 @@ def environment(name: str) -> np.ndarray:
 
 
 def main() -> None:
-    options = parsed(__doc__, presets=PRESETS, environments="studio,sunset", samples=2048, size=48, tilt=0.6)
+    options = parsed(
+        __doc__, presets=PRESETS, environments="studio,sunset,city,lobby,workshop", samples=768, size=48, tilt=0.6
+    )
     if why := chromium.missing():
         print(f"skipped: {why}")
         return
@@ -48,12 +50,10 @@ def main() -> None:
     with in_three.stage() as stage:
         for preset in options.presets.split(","):
             module = vt.export(preset, "three").text
+            truths = in_three.sampled(preset, [*skies.values()], options.size, options.samples, options.tilt)
             found = [
-                in_three.matched(
-                    in_three.sampled(preset, sky, options.size, options.samples, options.tilt),
-                    stage.ball(module, sky, options.size, tilt=options.tilt),
-                )
-                for sky in skies.values()
+                in_three.matched(truth, stage.ball(module, sky, options.size, tilt=options.tilt))
+                for truth, sky in zip(truths, skies.values())
             ]
             print(f"| {preset} | {' | '.join(f'{x:.3f}' for x in found)} |", flush=True)
 

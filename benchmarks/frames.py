@@ -1,18 +1,21 @@
 """Frames of three.js with materials of `--to three`, against frames with its MeshPhysicalMaterial.
 
 A page in headless Chromium, on the processor (SwiftShader), draws four balls under a prefiltered environment by one
-material after the other, round by round. Prints, for each preset, the frame's time over that of the engine's own
-material in the same round: plain, and with the clearcoat and anisotropy that such presets need there.
+material after the other, round by round. Prints, for each preset, the processor time of the browser's processes over
+that by the engine's own material in the same round: plain, and with the clearcoat and anisotropy that such presets need
+there. Needs psutil.
 
-    python benchmarks/frames.py [--presets bare-gold,coated-gold,...] [--rounds 15] [--size 440]
+    python benchmarks/frames.py [--presets bare-gold,coated-gold,...] [--rounds 9] [--frames 4] [--size 440]
 """
 
 from __future__ import annotations
 
 import sys
 from pathlib import Path
+from typing import Any
 
 import numpy as np
+import psutil
 from rows import parsed, row
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "tests" / "shared"))
@@ -24,7 +27,7 @@ import velatura as vt
 
 PRESETS = "bare-gold,car-paint,varnished-paint,wet-copper,anodised-titanium,coated-gold,frosted-glass"
 
-TIMES = """
+STAGE = """
 async (job) => {
   const THREE = await import('three');
   const renderer = new THREE.WebGLRenderer({ canvas: document.createElement('canvas') });
@@ -50,23 +53,39 @@ async (job) => {
     }),
   ];
   for (const module of job.modules) materials.push(new (await import(module)).LayeredMaterial());
-  const gl = renderer.getContext(), pixel = new Uint8Array(4), times = materials.map(() => []);
-  for (let round = -2; round < job.rounds; round++) {
-    for (const [k, material] of materials.entries()) {
-      for (const ball of balls) ball.material = material;
-      const start = performance.now();
+  const gl = renderer.getContext(), pixel = new Uint8Array(4);
+  window.draw = ([k, frames]) => {
+    for (const ball of balls) ball.material = materials[k];
+    for (let frame = 0; frame < frames; frame++) {
       renderer.render(scene, camera);
       gl.readPixels(0, 0, 1, 1, gl.RGBA, gl.UNSIGNED_BYTE, pixel); // the frame is drawn when it comes back
-      if (round >= 0) times[k].push(performance.now() - start);
     }
-  }
-  return times;
+  };
 }
 """
 
 
+def times(page: Any, modules: list[str], rounds: int, frames: int, size: int) -> np.ndarray:
+    """Processor time of frames in milliseconds, of the engine's two materials and of the modules; (2 + modules,
+    rounds)."""
+    page.evaluate(STAGE, {"modules": modules, "size": size})
+    processes = psutil.Process().children(recursive=True)
+
+    def spent() -> float:
+        return sum(sum(process.cpu_times()[:2]) for process in processes)
+
+    found = np.zeros((2 + len(modules), rounds))
+    for turn in range(-1, rounds):
+        for k in range(len(found)):
+            before = spent()
+            page.evaluate("job => window.draw(job)", [k, frames])
+            if turn >= 0:
+                found[k, turn] = (spent() - before) / frames * 1e3
+    return found
+
+
 def main() -> None:
-    options = parsed(__doc__, presets=PRESETS, rounds=15, size=440)
+    options = parsed(__doc__, presets=PRESETS, rounds=9, frames=4, size=440)
     if why := chromium.missing():
         print(f"skipped: {why}")
         return
@@ -74,11 +93,10 @@ def main() -> None:
     with in_three.stage() as stage:
         stage.files.update({f"{preset}.js": vt.export(preset, "three").text for preset in presets})
         modules = [f"/{preset}.js" for preset in presets]
-        job = {"modules": modules, "rounds": options.rounds, "size": options.size}
-        plain, coated, *ours = np.array(stage.page.evaluate(TIMES, job))
+        plain, coated, *ours = times(stage.page, modules, options.rounds, options.frames, options.size)
     row("frames", "MeshPhysicalMaterial", plain.tolist(), "ms")
-    for name, times in [("the same, clearcoat and anisotropy", coated), *zip(presets, ours)]:
-        row("frames", name, (times / plain).tolist(), "of a frame")
+    for name, found in [("the same, clearcoat and anisotropy", coated), *zip(presets, ours)]:
+        row("frames", name, (found / plain).tolist(), "of a frame")
 
 
 if __name__ == "__main__":

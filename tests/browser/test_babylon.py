@@ -31,7 +31,7 @@ def test_environments_light_a_ball_as_the_model_says(stage: in_three.Stage) -> N
     """Expected: the mean of 512 samples for each pixel, within .03 of white as displays have it; the engine's panoramas
     begin a quarter of a turn from those of three.js, whose test draws brushed layers by the same code."""
     preset, sky = "glossy-plastic", in_three.softbox()
-    expected = in_three.sampled(preset, np.roll(sky, -(sky.shape[1] // 4), axis=1), SIZE, 512, TILT)
+    [expected] = in_three.sampled(preset, [np.roll(sky, -(sky.shape[1] // 4), axis=1)], SIZE, 512, TILT)
     found = stage.ball(vt.export(preset, "babylon").text, sky, SIZE, tilt=TILT)
     assert in_three.matched(expected, found) < 0.03
 

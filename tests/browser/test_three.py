@@ -21,7 +21,7 @@ SIZE, TILT = 24, 0.6
 def test_environments_light_a_ball_as_the_model_says(three: in_three.Stage, preset: str, most: float) -> None:
     """Expected: the mean of 1,024 samples for each pixel, within .03 of white as displays have it, .05 where layers are
     brushed."""
-    expected = in_three.sampled(preset, in_three.softbox(), SIZE, 1024, TILT)
+    [expected] = in_three.sampled(preset, [in_three.softbox()], SIZE, 1024, TILT)
     found = three.ball(vt.export(preset, "three").text, in_three.softbox(), SIZE, tilt=TILT)
     assert in_three.matched(expected, found) < most
 

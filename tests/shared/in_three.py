@@ -15,7 +15,7 @@ import chromium
 import numpy as np
 from numpy.typing import NDArray
 from PIL import Image
-from scipy.ndimage import map_coordinates
+from scipy.ndimage import map_coordinates, uniform_filter
 
 import velatura as vt
 from velatura.editor import bundle
@@ -216,8 +216,9 @@ def radiance(sky: Array) -> bytes:
     return head.encode() + bytes_.astype(np.uint8).tobytes()
 
 
-def sampled(material: MaterialLike, sky: Array, size: int, samples: int, tilt: float = 0.0) -> Array:
-    """The same ball by means of so many samples of the model for each pixel, in NumPy."""
+def sampled(material: MaterialLike, skies: Sequence[Array], size: int, samples: int, tilt: float = 0.0) -> list[Array]:
+    """The same ball under each of some environments, by means of so many samples of the model for each pixel, in
+    NumPy."""
     across = (np.arange(size) + 0.5) / size * 2 - 1
     x, y = across / RADIUS, -across[:, None] / RADIUS
     inside = x**2 + y**2 < 1
@@ -229,21 +230,58 @@ def sampled(material: MaterialLike, sky: Array, size: int, samples: int, tilt: f
     t = np.cross(up, n, axisb=0).T
     t /= np.maximum(np.linalg.norm(t, axis=0), 1e-9)
     frame = np.stack([t, np.cross(n, t, axis=0), n])
-    wi = tuple(np.repeat(frame[:, 2], samples, axis=1))
     count = n.shape[1]
-    u, u1, u2 = (np.random.default_rng(5).random((3, count, 1)) + np.array(at_nodes(1, samples))[:, None]) % 1
+    generator = np.random.default_rng(5)
+    u, u1, u2 = (generator.random((3, count, 1)) + np.array(at_nodes(1, samples))[:, None]) % 1
+    wi = tuple(np.repeat(frame[:, 2], samples, axis=1))
     body = SideBySide.of([(1, Material.of(vt.load(material)))], named("velatura"))
     asked = Query(radiance=False)
-    wo = body.sample(wi, u.ravel(), u1.ravel(), u2.ravel(), asked)
-    value, density = body.eval_pdf(wi, wo, asked)
-    weight = np.where(density > 0, value / np.where(density > 0, density, 1), 0)
-    w = np.einsum("kan,kns->ans", frame, np.reshape(np.broadcast_arrays(*wo), (3, count, samples)))
-    light = (np.reshape(np.broadcast_to(weight, (3, count * samples)), (3, count, samples)) * looked_up(sky, w)).mean(
-        axis=-1
-    )
-    picture = np.zeros((size, size, 4))
-    picture[inside] = np.concatenate([light, np.ones((1, count))]).T
-    return picture
+    wo = np.array(np.broadcast_arrays(*body.sample(wi, u.ravel(), u1.ravel(), u2.ravel(), asked)))
+    w = np.einsum("kan,kns->ans", frame, wo.reshape(3, count, samples))
+    pictures = []
+    for sky in skies:
+        drawn = np.concatenate([w, _towards_lights(sky, (count, samples), generator)], axis=-1)
+        each = np.einsum("kan,ans->kns", frame, drawn).reshape(3, -1)
+        twice = tuple(np.repeat(frame[:, 2], 2 * samples, axis=1))
+        value, density = body.eval_pdf(twice, (each[0], each[1], each[2]), asked)
+        value = np.broadcast_to(value, (3, count * 2 * samples)).reshape(3, count, -1)
+        # The balance heuristic (Veach and Guibas 1995, Eq. 14)
+        density = np.reshape(density, (count, -1)) + _density_of_lights(sky, drawn)
+        weight = np.where(density > 0, value / np.where(density > 0, density, 1), 0) / samples
+        picture = np.zeros((size, size, 4))
+        picture[inside] = np.concatenate([(weight * looked_up(sky, drawn)).sum(axis=-1), np.ones((1, count))]).T
+        pictures.append(picture)
+    return pictures
+
+
+def _shares(sky: Array) -> Array:
+    """Share of each texel in an environment's light, with a tenth that goes to all directions alike."""
+    size = np.cos((0.5 - (np.arange(sky.shape[0]) + 0.5) / sky.shape[0]) * np.pi)[:, None] * np.ones(sky.shape[1])
+    light = uniform_filter(sky.mean(axis=-1), 3, mode=("nearest", "wrap")) * size  # texels are interpolated
+    return np.asarray(0.9 * light / light.sum() + 0.1 * size / size.sum())
+
+
+def _towards_lights(sky: Array, shape: tuple[int, int], generator: np.random.Generator) -> Array:
+    """Directions (3, *shape) by the light of an environment's texels, stratified along the last axis."""
+    height, width, _ = sky.shape
+    strata = (np.arange(shape[1]) + generator.random(shape)) / shape[1]
+    texel = np.minimum(np.searchsorted(np.cumsum(_shares(sky)), strata), height * width - 1)
+    row, column = np.divmod(texel, width)
+    phi = ((column + generator.random(shape)) / width - 0.5) * 2 * np.pi
+    edges = np.cos(np.arange(height + 1) * np.pi / height)
+    y = edges[row] + generator.random(shape) * (edges[row + 1] - edges[row])
+    across = np.sqrt(1 - y * y)
+    return np.stack([across * np.cos(phi), y, across * np.sin(phi)])
+
+
+def _density_of_lights(sky: Array, w: Array) -> Array:
+    """Density of `_towards_lights` over solid angle."""
+    height, width, _ = sky.shape
+    column = ((np.arctan2(w[2], w[0]) / (2 * np.pi) + 0.5) * width).astype(int) % width
+    row = np.minimum((np.arccos(np.clip(w[1], -1, 1)) / np.pi * height).astype(int), height - 1)
+    edges = np.cos(np.arange(height + 1) * np.pi / height)
+    solid = (edges[:-1] - edges[1:]) * 2 * np.pi / width
+    return np.asarray(_shares(sky)[row, column] / solid[row])
 
 
 def looked_up(sky: Array, w: Array) -> Array:

@@ -7,8 +7,8 @@ import pytest
 
 import velatura as vt
 from velatura.model import named
-from velatura.shader import prefiltered
-from velatura.shader.prefiltered import ALPHAS, VARIANCES, Prefiltered
+from velatura.shader import blurs, prefiltered
+from velatura.shader.prefiltered import Prefiltered
 from velatura.stack import Material
 
 
@@ -17,30 +17,54 @@ def parts(*layers: vt.stack.Layer) -> Prefiltered:
 
 
 def test_the_widest_blur_is_the_cosine() -> None:
-    """Expected: a variance of 1/4 along a tangent, that of Lambert's law; less for every lower alpha."""
-    assert (ALPHAS[-1], VARIANCES[0]) == (1, 0) and VARIANCES[-1] == pytest.approx(0.25, abs=1e-4)
-    assert np.all(np.diff(VARIANCES) > 0)
+    """Expected: Lambert's density, and a variance of 1/4 along a tangent; less for every lower alpha."""
+    versine = np.linspace(0, 1, 11)
+    np.testing.assert_allclose(blurs.density(versine, np.array(1.0)), (1 - versine) / np.pi, rtol=1e-6)
+    assert blurs.VARIANCES[-1] == pytest.approx(0.25, abs=1e-4)
+    assert np.all(np.diff(blurs.VARIANCES) > 0)
+
+
+@pytest.mark.parametrize("alpha", [0.03, 0.3, 0.98, 0.9999])
+def test_a_blur_is_a_density(alpha: float) -> None:
+    """Expected: an integral of 1 over the hemisphere about its direction."""
+    versine = np.concatenate([[0.0], np.geomspace(1e-7, 1.0, 20000)])
+    assert 2 * np.pi * np.trapezoid(blurs.density(versine, np.array(alpha)), versine) == pytest.approx(1, abs=1e-4)
+
+
+def test_blurs_are_found_again() -> None:
+    """Expected: two blurs that samples are drawn of, from others to begin with; without noise, as ratios are exact."""
+    drawn = np.array([[[0.05, 0.0, 0.3, 0.6], [0.3, 0.0, 0.6, 0.4]]])
+    sine, start = np.array([0.6]), np.array([[[0.0, 0.0, 0.35, 0.5], [0.2, 0.0, 0.7, 0.5]]])
+    rng = np.random.default_rng(2)
+    z, phi = rng.random(4000), 2 * np.pi * rng.random(4000)
+    w = np.stack([np.sqrt(1 - z * z) * np.cos(phi), np.sqrt(1 - z * z) * np.sin(phi), z])[:, None]
+    uniform = np.full((1, 4000), 1 / (2 * np.pi))
+    ratio = blurs.mixed(drawn, sine, w) / uniform
+    found = blurs.fitted(start, sine, w, ratio, uniform)
+    np.testing.assert_allclose(found, drawn, atol=0.02)
 
 
 def test_a_diffuse_base_is_its_irradiance() -> None:
     """Expected: its albedo about the normal, by the widest blur."""
     found = parts(vt.Diffuse(albedo=(0.6, 0.4, 0.2)))
-    assert found.rows.shape[2] == 1 and not any(found.passes)
-    np.testing.assert_allclose(found.rows[0, :, 0, :3], np.tile([0.6, 0.4, 0.2], (64, 1)), rtol=1e-3)
-    np.testing.assert_allclose(found.rows[0, 32:, 0, 3:5], 0, atol=0.02)
-    np.testing.assert_allclose(found.rows[0, :, 0, 5], 1, atol=0.02)
+    assert [blur.shape for blur in found.blurs] == [(1, 64, 1, 4)] and not any(found.passes)
+    np.testing.assert_allclose(found.energy[0, :, 0], np.tile([0.6, 0.4, 0.2], (64, 1)), rtol=1e-3)
+    sine = np.sqrt(1 - (np.arange(64) / 63) ** 4)
+    np.testing.assert_allclose(found.blurs[0][0, 8:, 0, 0], sine[8:], atol=0.03)
+    np.testing.assert_allclose(found.blurs[0][0, :, 0, 2], 1, atol=0.03)
 
 
 def test_a_smooth_metal_is_a_mirror_and_a_brushed_one_is_longer_across() -> None:
-    """Expected: the mirror's direction, and a narrow blur; by brushing along x, light near the normal is spread along
-    x, the first tangent."""
-    mirror = parts(vt.Interface(conductor="mirror", alpha=0.01)).rows[0, 20:-2, 0]
-    np.testing.assert_allclose(mirror[:, 3], -1, atol=0.01)
-    assert np.max(mirror[:, 5] ** 2) < 0.02
-    brushed = parts(vt.Interface(conductor="mirror", alpha=[0.3, 0.05]))
-    at_normal = brushed.rows[0].reshape(32, 17, -1, 12)[-1, 0, 0]
-    assert at_normal[6] > 0.05 and abs(at_normal[7]) < 0.02
-    assert brushed.elongation[0] > 2
+    """Expected: the mirror's direction, and narrow blurs; by brushing along y, light near the normal goes to places
+    that lie apart along x."""
+    [mirror] = parts(vt.Interface(conductor="mirror", alpha=0.01)).blurs
+    mean = (mirror[0, 20:-2] * mirror[0, 20:-2, :, 3:]).sum(axis=1)
+    np.testing.assert_allclose(mean[:, :2], 0, atol=0.01)
+    assert np.max(mean[:, 2] ** 2) < 0.02
+    [brushed] = parts(vt.Interface(conductor="mirror", alpha=[0.3, 0.05])).blurs
+    at_normal = brushed[0].reshape(32, 17, -1, 4)[-1, 0]
+    along, across = (at_normal[:, k] ** 2 @ at_normal[:, 3] for k in range(2))
+    assert along > 0.05 > 20 * across
 
 
 def test_energies_are_those_of_lobes() -> None:
@@ -50,4 +74,4 @@ def test_energies_are_those_of_lobes() -> None:
     cosine = (np.arange(64) / 63) ** 2
     lobes = vt.lobes(stack, cosine[20::10])
     total = sum(np.asarray(energy) for energy in lobes.energy) + np.asarray(lobes.remainder)
-    np.testing.assert_allclose(found.rows[0, 20::10, :, :3].sum(axis=1).T, total, atol=5e-3)
+    np.testing.assert_allclose(found.energy[0, 20::10].sum(axis=1).T, total, atol=5e-3)

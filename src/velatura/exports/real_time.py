@@ -21,14 +21,11 @@ from velatura.model.variance import Isotropic
 from velatura.shader import Shader, prefiltered, shader
 from velatura.shader.closures import shares
 from velatura.shader.material import title
-from velatura.shader.prefiltered import ROUND, Prefiltered
+from velatura.shader.prefiltered import Prefiltered
 from velatura.shader.printers.glsl import Glsl
 from velatura.shader.program import described
 from velatura.shader.recorder import recording
 from velatura.stack import Material, Varying
-
-MOST_TAPS = 9  # along the longer axis of a part
-DENSITY = 3.4  # taps in a width of the blur
 
 
 @dataclass(frozen=True)
@@ -96,21 +93,32 @@ def environment(request: Request) -> Environment:
         lines += list(_part_lines(share, found, first))
         texels.append(np.pad(own, ((0, 0), (0, widest - own.shape[1]), (0, 0))))
         first += len(own)
-    code = _ENVIRONMENT.format(parts="\n".join(lines), round=ROUND, half=DENSITY / 2)
-    return Environment(code, np.concatenate(texels))
+    texture = np.concatenate(texels)
+    azimuths = any(len(found.shape) > 1 for _, found in parts)
+    code = _ENVIRONMENT.format(parts="\n".join(lines), azimuth=_AZIMUTH if azimuths else "")
+    return Environment(code, texture)
 
 
 def _part_lines(share: float, found: Prefiltered, first: int) -> Iterator[str]:
     """Statements that add up the parts of a stack whose lines begin at a number."""
-    cosines, turns = (*found.shape, 1)[:2]
-    sides, _, parts, numbers = found.rows.shape
-    texels = numbers // 4
-    for k, (passes, longer) in enumerate(zip(found.passes, found.elongation)):
-        taps = min(1 + 2 * int(np.ceil(0.5 * DENSITY * longer)), MOST_TAPS) if longer > ROUND else 1
-        side, above = "-side" if passes else "side", first + texels * k * turns
-        line = f"side < 0.0 ? {above + texels * parts * turns} : {above}" if sides > 1 else f"{above}"
-        where = "" if sides > 1 else "if (side > 0.0) "
-        yield f"    {where}sum += {share:.6f} * vt_part({line}, ivec2({cosines}, {turns}), wi, {side}, {taps});"
+    turns = (*found.shape, 1)[1]
+    height = turns * sum(1 + blurs.shape[2] for blurs in found.blurs)
+    sides = len(found.energy)
+
+    def texel(line: int) -> str:
+        above = f"{first + turns * line}.5"
+        chosen = f"(wi.z < 0.0 ? {first + turns * line + height}.5 : {above})" if sides > 1 else above
+        place = f"vec2(0.5 + {found.shape[0] - 1}.0 * column, {chosen}" + (
+            f" + azimuth * {turns - 1}.0)" if turns > 1 else ")"
+        )
+        return f"vt_texel({place})"
+
+    line = 0
+    for passes, blurs in zip(found.passes, found.blurs):
+        side = "-wi.z" if passes else "wi.z"
+        seen = [f"vt_blur({texel(line + 1 + k)}, wi, plane, {side})" for k in range(blurs.shape[2])]
+        yield f"    sum += {share:.6f} * {texel(line)}.rgb * ({' + '.join(seen)});"
+        line += 1 + blurs.shape[2]
 
 
 def _without_comments(code: str) -> str:
@@ -182,67 +190,33 @@ _TANGENT = """\
 """
 
 _ENVIRONMENT = """\
-// The material's parts by the environment: of each its energy, where it leaves, root of alpha, and shape
+// The material's parts by the environment: of each its energy, and its blurs. Of a blur how far it leaves beyond the
+// mirror's direction, in the plane of incidence and beside it; root of alpha; share
 uniform highp sampler2D vt_parts;
 
-vec4 vt_part_line(int line, ivec2 nodes, vec2 place) {{
-    vec2 texel = place * vec2(nodes - 1) + vec2(0.5, float(line) + 0.5);
+vec4 vt_texel(vec2 texel) {{
     return textureLod(vt_parts, texel / vec2(textureSize(vt_parts, 0)), 0.0);
 }}
 
-// A part on the side of the surface where it leaves, by blurs side by side
-vec3 vt_part(int line, ivec2 nodes, vec3 wi, float side, int most) {{
-    vec2 twice = vec2(wi.x * wi.x - wi.y * wi.y + 1e-15, 2.0 * wi.x * wi.y);
-    float along = twice.x / (abs(twice.x) + abs(twice.y));
-    vec2 place = vec2(sqrt(abs(wi.z)), 0.25 * (twice.y < 0.0 ? 3.0 + along : 1.0 - along));
-    vec4 a = vt_part_line(line, nodes, place), b = vt_part_line(line + nodes.y, nodes, place);
-    vec4 shape = vt_part_line(line + 2 * nodes.y, nodes, place);
-
-    // The mean direction, and tangents about it (Duff et al. 2017)
-    float sine = length(wi.xy);
-    vec2 across = sine * vec2(a.w, b.x);
-    vec3 w = vec3(across, side * sqrt(max(1.0 - dot(across, across), 0.0)));
-    float c = -1.0 / (side + w.z), d = w.x * w.y * c;
-    vec3 x = vec3(1.0 + side * w.x * w.x * c, side * d, -side * w.x), y = vec3(d, side + w.y * w.y * c, -w.y);
-
-    // The longer axis
-    float more = length(b.zw), cosine = more > 0.0 ? b.z / more : 1.0;
-    vec2 turn = sqrt(max(0.5 + 0.5 * vec2(cosine, -cosine), vec2(0.0)));
-    if (b.w < 0.0) turn.y = -turn.y;
-    vec3 axis = turn.x * x + turn.y * y;
-    float skew = dot(shape.xy, turn) / 6.0, growth = dot(shape.zw, turn);
-
-    // From the plane of incidence
-    vec2 plane = sine > 1e-6 ? wi.xy / sine : vec2(1.0, 0.0);
-    w = vec3(plane.x * w.x - plane.y * w.y, plane.y * w.x + plane.x * w.y, w.z);
-    axis = vec3(plane.x * axis.x - plane.y * axis.y, plane.y * axis.x + plane.x * axis.y, axis.z);
-
-    // As many blurs as the axis is longer here; a blur's width to 10 %, of which details below .02 matter to no map
-    float width = b.y * b.y * (0.42 - 1.22 * log(max(b.y, 1e-3))), longer = sqrt(more) / max(width, 0.02);
-    int taps = longer > {round} ? min(1 + 2 * int(ceil({half} * longer)), most) : 1;
-    vec3 sum = vec3(0.0);
-    float whole = 0.0;
-    for (int k = 0; k < taps; k++) {{
-        // Places by a gamma distribution (Wilson and Hilferty 1931)
-        float normal = taps > 1 ? 4.2 * float(k) / float(taps - 1) - 2.1 : 0.0, share = exp(-0.45 * normal * normal);
-        float h = skew * (taps > 1 ? normal - skew : 0.0), at = (normal - skew) * (1.0 + h + h * h / 3.0);
-        float p = taps > 1 ? clamp(sqrt(more) * at, -0.99, 0.99) : 0.0;
-        vec3 tap = sqrt(1.0 - p * p) * w + p * axis;
-        tap.z = side * max(side * tap.z, 0.0);
-        float wider = taps > 1 ? sqrt(sqrt(clamp(1.0 + growth * at, 0.06, 16.0))) : 1.0;
-        sum += share * vt_blurred(normalize(tap), min(b.y * wider, 1.0));
-        whole += share;
-    }}
-    return a.rgb * sum / whole;
+vec3 vt_blur(vec4 blur, vec3 wi, vec2 plane, float side) {{
+    vec2 across = vec2(plane.x * blur.x - plane.y * blur.y, plane.y * blur.x + plane.x * blur.y) - wi.xy;
+    float up = sqrt(max(1.0 - dot(across, across), 0.0));
+    return blur.w * vt_blurred(vec3(across, side < 0.0 ? -up : up), blur.z);
 }}
 
 // Light from wi by the environment that vt_blurred gives
 vec3 vt_environment(vec3 wi) {{
-    vec3 sum = vec3(0.0);
-    float side = wi.z < 0.0 ? -1.0 : 1.0;
+    float sine2 = dot(wi.xy, wi.xy), column = sqrt(abs(wi.z));
+    vec2 plane = sine2 > 1e-12 ? wi.xy * inversesqrt(sine2) : vec2(1.0, 0.0);
+{azimuth}    vec3 sum = vec3(0.0);
 {parts}
     return sum;
 }}
+"""
+
+_AZIMUTH = """\
+    vec2 twice = vec2(wi.x * wi.x - wi.y * wi.y + 1e-15, 2.0 * wi.x * wi.y);
+    float along = twice.x / (abs(twice.x) + abs(twice.y)), azimuth = 0.25 * (twice.y < 0.0 ? 3.0 + along : 1.0 - along);
 """
 
 _UNPACKED = """\

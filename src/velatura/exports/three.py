@@ -110,9 +110,16 @@ ${{code}}
 ${{frame}}
 
 #ifdef USE_ENVMAP
+mat3 vt_sky; // from the frame to the environment's
+
 vec3 vt_blurred(vec3 w, float roughness) {{
-    vec3 seen = vt_frame * w;
+    #ifdef ENVMAP_TYPE_PMREM
+    float level = floor(8.0 * roughnessToMip(roughness) + 0.5) / 8.0; // that neighbours mostly share
+    return envMapIntensity * textureLod(envMap, vt_sky * w, level).rgb;
+    #else
+    vec3 seen = vt_frame * w; // before r187
     return getIBLRadiance(seen, seen, roughness);
+    #endif
 }}
 
 ${{environment}}
@@ -153,6 +160,7 @@ void main() {{
     #include <lights_fragment_begin>
     vec3 light = reflectedLight.directSpecular;
     #ifdef USE_ENVMAP
+    vt_sky = envMapRotation * transpose(mat3(viewMatrix)) * vt_frame;
     light += vt_environment(material.wi);
     #endif
     gl_FragColor = vec4(light, 1.0);

@@ -1,11 +1,9 @@
-"""The light of a material by prefiltered environments: for light from each direction, every part's energy, the mean
-direction in which it leaves, its width, and its skewness.
+"""The light of a material by prefiltered environments: for light from each direction, every part's energy, and the
+blurs of the environment that stand for the part.
 
-An engine blurs its environment by a GGX lobe seen along the normal (Karis 2013), of roughness alpha
-(`kernel_variance`). A part of the model is then that blur about its own mean direction. It takes the alpha by which the
-blur is as wide as the part is across its axis of least width; along the other axis several blurs lie side by side, of
-which those on one side are nearer to each other and narrower, as third moments ask. Widths are second moments on the
-sphere, which are finite for GGX.
+A part is the light of one interface, the remainder, or what passes. Its blurs are those of `velatura.shader.blurs`,
+each about a direction of its own, which is bent from the mirror's. Parts share as many of them as a frame can afford;
+they go where they bring most.
 """
 
 from __future__ import annotations
@@ -20,59 +18,35 @@ from numpy.typing import NDArray
 from velatura.model import Model, variance_kind
 from velatura.model.base import Body, Query
 from velatura.model.context import Context
-from velatura.model.guards import ALPHA_MIN
 from velatura.model.variance import Isotropic
 from velatura.optics.ggx import Direction
 from velatura.optics.phase import tangents
 from velatura.renderer import directional_grid
 from velatura.renderer.low_discrepancy import at_nodes, repeated
+from velatura.shader import blurs
 from velatura.stack import Material
 
 Array = NDArray[np.floating]
 
 LINE, PLANE = (64,), (32, 17)  # nodes over the cosine, and the azimuth where an interface is brushed
 COS_MIN, COS_MAX = 0.02, 1 - 1e-6  # of directions at nodes, which all have an azimuth
-SAMPLES = 1024  # of a part at a node
+SAMPLES = 1024  # of a part at a node, of which a plane's blurs are fitted to a quarter
 FAINT = 1e-4  # energy, below which a part is left out
-ROUND = 0.3  # elongation, up to which one blur serves
-MOST_SKEW, MOST_GROWTH = 2.0, 2.0  # of the blurs along the longer axis
-ALPHAS = np.concatenate([[0.0], np.geomspace(ALPHA_MIN, 1.0, 100)])
+MOST = {LINE: 4, PLANE: 6}  # blurs, but one at least for each part
+NEAR = 0.001  # distance times energy and alpha, from which a part gets no further blur
 
 
 @dataclass(frozen=True)
 class Prefiltered:
-    """Parts over direction, from above and, where the material transmits, from below: `rows` (sides, nodes, parts, 12).
-
-    Of each part: energy, a colour; the mean direction across the normal, in the plane of incidence and beside it, over
-    the sine of the direction of light; the root of alpha; and the variance that the longer axis has beyond the shorter,
-    times cosine and sine of twice its angle from the first of the `tangents`. Then vectors along that axis, in those
-    tangents: the skewness of the blurs' places, and the growth of a blur's variance with its place, both in units of
-    the root of that variance. `passes` says which parts leave on the other side.
+    """Parts over direction, from above and, where the material transmits, from below: their energies
+    (sides, nodes, parts, 3), and of each part its blurs (sides, nodes, K, 4), as `blurs.fitted` returns them. `passes`
+    says which parts leave on the other side.
     """
 
-    rows: Array
+    energy: Array
+    blurs: Sequence[Array]
     shape: tuple[int, ...]
     passes: Sequence[bool]
-
-    @property
-    def elongation(self) -> Array:
-        """Greatest spread along the longer axis over the width of the blur, of each part; (parts,)."""
-        roughness, more = self.rows[..., 5], np.hypot(self.rows[..., 6], self.rows[..., 7])
-        bright = self.rows[..., :3].max(axis=-1) > 0.1 * self.rows[..., :3].max()
-        ratio = np.sqrt(more / np.maximum(np.interp(roughness**2, ALPHAS, VARIANCES), VARIANCES[1]))
-        return np.asarray(np.where(bright, ratio, 0).max(axis=(0, 1)))
-
-
-def kernel_variance(alpha: float) -> float:
-    """Variance of the blur along a tangent: of z / (1 + a^2 - (1 - a^2) z)^2 over cosines z from its axis."""
-    # In powers of the sine of half the angle, so that narrow blurs have nodes
-    s = np.geomspace(1e-9, 0.5, 4000)
-    z = 1 - 2 * s
-    weight = z / (2 * alpha**2 + (1 - alpha**2) * 2 * s) ** 2
-    return float(0.5 * np.trapezoid(weight * (1 - z * z), s) / np.trapezoid(weight, s))
-
-
-VARIANCES = np.array([0.0, *map(kernel_variance, ALPHAS[1:])])
 
 
 def prefiltered(material: Material, model: Model) -> Prefiltered:
@@ -87,65 +61,104 @@ def prefiltered(material: Material, model: Model) -> Prefiltered:
     reflected = [Query([k == j for j in range(count + 1)], False) for k in range(count + 1)]
     asked = [*reflected, *([Query(False, True, radiance=False)] if material.transmits else [])]
     sides = [1.0, -1.0] if material.transmits else [1.0]
-    rows = np.array([[_moments(body, (x * scale, y * scale, side * z), each) for each in asked] for side in sides])
-    kept = np.nonzero(rows[..., :3].max(axis=(0, 2, 3)) > FAINT)[0]
-    kept = kept if len(kept) else np.arange(1)
-    # At the normal the ratio of two small numbers is noise
-    turns = prod(shape[1:])
-    rows[..., -turns:, 3:5] = rows[..., -2 * turns : -turns, 3:5]
-    return Prefiltered(rows[:, kept].transpose(0, 2, 1, 3), shape, [bool(asked[k].transmission) for k in kept.tolist()])
+    parts = [[_Part.of(body, (x * scale, y * scale, side * z), each) for side in sides] for each in asked]
+    kept = [k for k, part in enumerate(parts) if max(np.max(side.energy) for side in part) > FAINT] or [0]
+    found = _shared([parts[k] for k in kept], MOST[shape])
+    energy = np.stack([np.stack([side.energy for side in parts[k]]) for k in kept], axis=2)
+    return Prefiltered(energy, found, shape, [bool(asked[k].transmission) for k in kept])
 
 
-def _moments(body: Body, wi: Direction, asked: Query) -> Array:
-    """The numbers of a part at directions (N,): (N, 12)."""
-    nodes = len(wi[0])
-    u = at_nodes(nodes, SAMPLES)
-    repeat = tuple(repeated(x, SAMPLES) for x in wi)
-    wo, _ = body.sample(repeat, *u, asked)
-    value, density = body.eval_pdf(repeat, wo, asked)
-    weight = np.where(density > 0, value / np.where(density > 0, density, 1), 0)
-    weight = np.broadcast_to(weight, (3, nodes * SAMPLES)).reshape(3, nodes, SAMPLES)
-    energy = weight.mean(axis=-1)
-    w = np.array(np.broadcast_arrays(*wo)).reshape(3, nodes, SAMPLES)
-    share = weight.mean(axis=0)
-    share = share / np.maximum(share.sum(axis=-1, keepdims=True), 1e-12)
+def _shared(parts: Sequence[Sequence[_Part]], most: int) -> list[Array]:
+    """The blurs of parts from each side: one each, and further ones where the distance is largest."""
 
-    # The mean, in the plane of incidence
-    sine = np.hypot(wi[0], wi[1])
-    c, s = (wi[0] / sine)[:, None], (wi[1] / sine)[:, None]
-    w = np.stack([c * w[0] + s * w[1], c * w[1] - s * w[0], w[2]])
-    mean = (w * share).sum(axis=-1)
-    length = np.linalg.norm(mean, axis=0)
-    upwards = np.array([0.0, 0.0, 1.0])[:, None]
-    mean = np.where(length > 1e-6, mean / np.maximum(length, 1e-6), upwards)
+    def of(part: Sequence[_Part], count: int) -> tuple[Array, float]:
+        found = [side.blurs(count) for side in part]
+        return np.stack([x for x, _ in found]), max(distance for _, distance in found)
 
-    # Variances about it
-    along = [np.einsum("an,ans->ns", np.stack(t), w) for t in tangents((mean[0], mean[1], mean[2]))]
-    xx, xy, yy = ((along[a] * along[b] * share).sum(axis=-1) for a, b in ((0, 0), (0, 1), (1, 1)))
-    half, cross = 0.5 * (xx - yy), xy
-    radius = np.hypot(half, cross)
-    least = np.maximum(0.5 * (xx + yy) - radius, 0)
-    alpha = np.interp(least, VARIANCES, ALPHAS)
+    found = [of(part, 1) for part in parts]
+    for _ in range(most - len(parts)):
+        worst = int(np.argmax([distance for _, distance in found]))
+        if found[worst][1] < NEAR:
+            break
+        found[worst] = of(parts[worst], found[worst][0].shape[2] + 1)
+    return [x for x, _ in found]
 
-    # Third moments: a blur whose variance grows along the axis gives three times what it takes across it
-    angle = 0.5 * np.arctan2(cross, half)
-    axis = np.array([np.cos(angle), np.sin(angle)])
-    a = axis[0][:, None] * along[0] + axis[1][:, None] * along[1]
-    b = axis[0][:, None] * along[1] - axis[1][:, None] * along[0]
-    aaa, abb = (share * a**3).sum(axis=-1), (share * a * b * b).sum(axis=-1)
-    blur = np.maximum(np.interp(alpha, ALPHAS, VARIANCES), 1e-12)
-    beyond = np.sqrt(np.maximum(2 * radius, ROUND**2 * blur))
-    skewness = np.clip((aaa - 3 * abb) / beyond**3, -MOST_SKEW, MOST_SKEW)
-    growth = np.clip(abb / (blur * beyond), -MOST_GROWTH, MOST_GROWTH)
-    shape = [*(skewness * axis), *(growth * axis)]
-    return np.stack([*energy, mean[0] / sine, mean[1] / sine, np.sqrt(alpha), 2 * half, 2 * cross, *shape], axis=-1)
+
+@dataclass(frozen=True)
+class _Part:
+    """Samples of a part on one side of the surface, for light from nodes: energies (nodes, 3); the sine of their
+    direction; directions (3, nodes, samples), in the plane of incidence, upwards; densities over those of samples,
+    which are last, 0 on the other side."""
+
+    energy: Array
+    sine: Array
+    w: Array
+    ratio: Array
+    density: Array
+
+    @classmethod
+    def of(cls, body: Body, wi: Direction, asked: Query) -> _Part:
+        nodes = len(wi[0])
+        u = at_nodes(nodes, SAMPLES)
+        repeat = tuple(repeated(x, SAMPLES) for x in wi)
+        wo, _ = body.sample(repeat, *u, asked)
+        value, density = body.eval_pdf(repeat, wo, asked)
+        weight = np.where(density > 0, value / np.where(density > 0, density, 1), 0)
+        weight = np.broadcast_to(weight, (3, nodes * SAMPLES)).reshape(3, nodes, SAMPLES)
+        w = np.array(np.broadcast_arrays(*wo)).reshape(3, nodes, SAMPLES)
+        ratio = weight.mean(axis=0)
+        ratio = ratio / np.maximum(ratio.mean(axis=-1, keepdims=True), 1e-12)
+        sine = np.hypot(wi[0], wi[1])
+        c, s = (wi[0] / sine)[:, None], (wi[1] / sine)[:, None]
+        up = np.sign(wi[2])[:, None] * (-1 if asked.transmission else 1) * w[2]
+        w = np.stack([c * w[0] + s * w[1], c * w[1] - s * w[0], np.abs(up)])
+        density = np.where(up > 0, np.broadcast_to(density, nodes * SAMPLES).reshape(nodes, SAMPLES), 0)
+        return cls(weight.mean(axis=-1).T, sine, w, ratio, density)
+
+    def blurs(self, count: int) -> tuple[Array, float]:
+        """So many blurs (nodes, count, 4), and the mean over nodes of their distance times energy and alpha, since
+        environments differ less over small angles."""
+        few = slice(None, None, 1 if len(self.sine) == LINE[0] else 4)
+        w, ratio, density = self.w[..., few], self.ratio[:, few], self.density[:, few]
+        found = blurs.fitted(self._start(count), self.sine, w, ratio, density)
+        if count > 1:
+            # Each of one alpha from all directions, so that neighbours read the same level of a texture
+            weight = self.energy.max(axis=-1)[:, None] * found[..., 3]
+            found[..., 2] = (weight * found[..., 2]).sum(axis=0) / np.maximum(weight.sum(axis=0), 1e-12)
+            found = blurs.fitted(found, self.sine, w, ratio, density, fixed=True)
+        distance = blurs.distance(found, self.sine, w, ratio, density)
+        alpha = (found[..., 2] ** 2 * found[..., 3]).sum(axis=-1)
+        return found, float(np.mean(distance * self.energy.max(axis=-1) * alpha))
+
+    def _start(self, count: int) -> Array:
+        """Blurs side by side along the longer axis, the narrower ones first."""
+        share = self.ratio / self.ratio.shape[1]
+        mean = (self.w * share).sum(axis=-1)
+        length = np.linalg.norm(mean, axis=0)
+        upwards = np.array([0.0, 0.0, 1.0])[:, None]
+        mean = np.where(length > 1e-6, mean / np.maximum(length, 1e-6), upwards)
+        across = np.stack(tangents((mean[0], mean[1], mean[2])))
+        along = [np.einsum("an,ans->ns", t, self.w) for t in across]
+        xx, xy, yy = ((along[a] * along[b] * share).sum(axis=-1) for a, b in ((0, 0), (0, 1), (1, 1)))
+        more = np.hypot(0.5 * (xx - yy), xy)
+        angle = 0.5 * np.arctan2(xy, 0.5 * (xx - yy))
+        axis = np.cos(angle) * across[0] + np.sin(angle) * across[1]
+        root = np.sqrt(blurs.alpha_of(np.maximum(0.5 * (xx + yy) - more, 0)))
+        found = []
+        for place in np.arange(count) - 0.5 * (count - 1):
+            p = np.clip(1.5 * place * np.sqrt(more), -0.95, 0.95)
+            w = np.sqrt(1 - p * p) * mean + p * axis
+            width = np.clip(root * 1.25**place, blurs.LEAST, 1)
+            found.append(np.stack([w[0] + self.sine, w[1], width, np.full_like(root, 1 / count)], axis=-1))
+        return np.stack(found, axis=1)
 
 
 def texture(found: Prefiltered) -> Array:
-    """Texels, float32 of shape (height, width, 4): a column for each cosine; for each side, part, and half of its
-    numbers a line, or one for each azimuth."""
-    sides, _, parts, numbers = found.rows.shape
-    cosines = found.shape[0]
-    turns = prod(found.shape[1:])
-    grid = found.rows.reshape(sides, cosines, turns, parts, numbers // 4, 4)
-    return np.ascontiguousarray(grid.transpose(0, 3, 4, 2, 1, 5), np.float32).reshape(-1, cosines, 4)
+    """Texels, float32 of shape (height, width, 4): a column for each cosine; for each side and part a line of its
+    energy and one for each blur, or such lines for each azimuth."""
+    cosines, turns = found.shape[0], prod(found.shape[1:])
+    sides = len(found.energy)
+    energy = np.pad(found.energy, ((0, 0), (0, 0), (0, 0), (0, 1)))
+    rows = np.concatenate([x for k, part in enumerate(found.blurs) for x in (energy[:, :, k : k + 1], part)], axis=2)
+    grid = rows.reshape(sides, cosines, turns, -1, 4)
+    return np.ascontiguousarray(grid.transpose(0, 3, 2, 1, 4), np.float32).reshape(-1, cosines, 4)

@@ -1,0 +1,131 @@
+"""A distribution of directions as a few blurs, which engines have of their environments.
+
+A blur is GGX of reflectance 1, seen along a normal that is the blur's direction (Karis 2013): a density of
+z / (1 + alpha^2 - (1 - alpha^2) z)^2 over the cosine z from that direction, which at alpha = 1 is Lambert's law.
+Blurs are fitted by Hellinger's distance, the square of the difference of roots of densities, over samples of the
+distribution. It counts the tail of a lobe, which a small bright light shows, more than squares would, and less than
+likelihood does, for which a tail is all. `fitted` runs for all nodes at once, by the steps of Levenberg and Marquardt.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from velatura.model.guards import ALPHA_MIN
+
+Array = NDArray[np.floating]
+
+STEPS = 12  # of the fit
+DAMPING = 0.1  # at its begin
+STEP = 1e-4  # of differences
+LEAST = np.sqrt(ALPHA_MIN)  # root of alpha
+TIED = 0.02  # weight of what a blur begins with, where samples decide little
+
+
+def density(versine: Array, alpha: Array) -> Array:
+    """Density of a blur over solid angle, at 1 - z."""
+    a = alpha * alpha
+    slope = 1 - a
+    below = 2 * a
+    shallow = slope < 1e-3  # near Lambert's law, where the integral is a ratio of small numbers
+    s = np.where(shallow, 1e-3, slope)
+    whole = ((1 + below / s) * (1 / below - 1 / (below + s)) - np.log1p(s / below) / s) / s
+    whole = np.where(shallow, 0.125 * (1 + 5 / 3 * slope), whole)
+    return np.maximum(1 - versine, 0) / (below + slope * versine) ** 2 / (2 * np.pi * whole)
+
+
+def mixed(blurs: Array, sine: Array, w: Array) -> Array:
+    """Density of blurs (nodes, K, 4) in directions (3, nodes, samples)."""
+    found = np.zeros(w.shape[1:])
+    for k in range(blurs.shape[1]):
+        x, y, root, share = blurs[:, k].T
+        across = np.stack([x - sine, y])
+        z = np.sqrt(np.maximum(1 - (across**2).sum(axis=0), 0))
+        towards = np.stack([*across, z])[..., None]
+        versine = 0.5 * ((w - towards) ** 2).sum(axis=0)
+        found = found + share[:, None] * density(versine, root[:, None] ** 2)
+    return found
+
+
+def distance(found: Array, sine: Array, w: Array, ratio: Array, sampled: Array) -> Array:
+    """Hellinger's distance of blurs to samples at each node, 0 to 2; arguments as of `fitted`."""
+    drawn = sampled > 0
+    near = np.sqrt(mixed(found, sine, w) / np.where(drawn, sampled, 1)) - np.sqrt(ratio)
+    return np.asarray(np.where(drawn, near**2, 0).mean(axis=-1))
+
+
+def _variance(alpha: float) -> float:
+    """Variance of a blur along a tangent."""
+    # In powers of the sine of half the angle, so that narrow blurs have nodes
+    s = np.geomspace(1e-9, 0.5, 4000)
+    z = 1 - 2 * s
+    weight = z / (2 * alpha**2 + (1 - alpha**2) * 2 * s) ** 2
+    return float(0.5 * np.trapezoid(weight * (1 - z * z), s) / np.trapezoid(weight, s))
+
+
+ALPHAS = np.geomspace(ALPHA_MIN, 1.0, 100)
+VARIANCES = np.array([_variance(alpha) for alpha in ALPHAS])
+
+
+def alpha_of(variance: Array) -> Array:
+    """The alpha by which a blur has a variance along a tangent."""
+    return np.interp(variance, VARIANCES, ALPHAS)
+
+
+def fitted(start: Array, sine: Array, w: Array, ratio: Array, sampled: Array, fixed: bool = False) -> Array:
+    """Blurs (nodes, K, 4): across the normal, in the plane of incidence and beside it, beyond the mirror's direction;
+    the root of alpha; the share.
+
+    Args:
+        start: blurs to begin with.
+        sine: of the direction of light, at each node.
+        w: directions (3, nodes, samples), in the plane of incidence, upwards.
+        ratio: the distribution's density there over that of samples.
+        sampled: the density of samples.
+        fixed: leave alphas as they are.
+    """
+    nodes, count, _ = start.shape
+    root = np.sqrt(ratio / ratio.shape[1])
+    drawn = sampled > 0
+    per = np.where(drawn, 1 / np.sqrt(np.where(drawn, sampled, 1) * ratio.shape[1]), 0)
+    free = [k for k in range(4 * count) if not (fixed and k % 4 == 2)]
+
+    def bounded(x: Array) -> Array:
+        blurs = start.copy()
+        blurs.reshape(nodes, -1)[:, free] = x
+        blurs[..., 2] = np.clip(blurs[..., 2], LEAST, 1)
+        blurs[..., 3] = np.exp(np.clip(blurs[..., 3], -6, 6))
+        blurs[..., 3] /= blurs[..., 3].sum(axis=1, keepdims=True)
+        across = blurs[..., :2] - np.stack([sine, 0 * sine], axis=-1)[:, None]
+        length = np.maximum(np.hypot(across[..., 0], across[..., 1]) / 0.9999, 1)
+        blurs[..., :2] += across * (1 / length - 1)[..., None]
+        return blurs
+
+    start = start.copy()
+    start[..., 3] = np.log(np.maximum(start[..., 3], 1e-3))
+    scale = np.ones_like(start)
+    scale[..., :2] = start[..., 2:3] ** 2  # places in units of the width, so that steps are of one size
+    first, scale = (each.reshape(nodes, -1)[:, free] for each in (start, scale))
+
+    def residual(x: Array) -> Array:
+        near = np.sqrt(mixed(bounded(x), sine, w)) * per - root
+        return np.concatenate([np.where(drawn, near, 0), TIED * (x - first) / scale], axis=1)
+
+    x, now = first, residual(first)
+    error = (now**2).sum(axis=1)
+    damping = np.full(nodes, DAMPING)
+    for _ in range(STEPS):
+        moved = [np.where(np.arange(len(free)) == k, x + STEP * scale, x) for k in range(len(free))]
+        slope = np.stack([(residual(each) - now) / STEP for each in moved], axis=-1)
+        across = slope.transpose(0, 2, 1)
+        normal = across @ slope
+        normal += (damping[:, None] * (np.einsum("nii->ni", normal) + 1e-6))[..., None] * np.eye(len(free))
+        step = np.linalg.solve(normal, -(across @ now[..., None]))[..., 0]
+        tried = x + np.clip(step, -1, 1) * scale
+        then = residual(tried)
+        better = (then**2).sum(axis=1) < error
+        x, now = np.where(better[:, None], tried, x), np.where(better[:, None], then, now)
+        error = (now**2).sum(axis=1)
+        damping = np.where(better, damping / 3, damping * 4)
+    return bounded(x)
