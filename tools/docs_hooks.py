@@ -54,6 +54,7 @@ EXAMPLES = (
     "pigments",
     "polarised",
     "polariser",
+    "exact",
     "inverse",
     "wishes",
     "fit",
