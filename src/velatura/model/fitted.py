@@ -11,17 +11,11 @@ OPAQUE_STEP = 1.4  # step of the logarithm of the index that turns as much as a 
 BRUSHED_FROM = (
     0.3  # difference of two roughnesses, as share of the larger, from which light keeps its momentum along facets
 )
-PASSED_ON = 0.75  # share of repeated light that passes brushed facets in the directions of second events
-# Share of repeated light that passes isotropic facets in the directions of second events, at least; the step of the
-# logarithm of the index below which it is more; the roughness where it begins, and is whole
-ONWARD = 0.3
-ONWARD_STEP = 0.3
-ONWARD_FROM = 0.2, 0.4
 BLOCKED = (0.004, 0.014)  # shares of blocked light below which, and above which, its share comes from the tables
 BLOCKED_IN_THE_END = (0.9, 0.15)  # share of little blocked light that is reflected, towards a rarer medium and a denser
 # Step of the logarithm of the index that refracted light which meets further facets still passes, where these are met
 # often, and where such light is lost
-STRAIGHT_STEP = {True: 0.09, False: 0.01}
+STRAIGHT_STEP = {True: 0.04, False: 0.01}
 UNDISTURBED = 0.5  # steps of the logarithm of the index, over which light of repeated facets loses the shape of a lobe
 AGAIN = 1.0  # of light of repeated facets beside that of single ones, that has the shape of a lobe at most
 AGAIN_POWER = 4.0  # of that minimum

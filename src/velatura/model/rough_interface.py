@@ -1,7 +1,7 @@
 """Rough interfaces in numbers: their facets, and what these do to light that meets them first.
 
-Light meets visible normals on a lattice. Light that the facets block meets others; where films lie on these, walks say
-what becomes of it.
+Light meets visible normals on a lattice. Light that the facets block meets two more, at heights of the Smith
+microsurface; where films lie on these, walks say what becomes of it.
 """
 
 from __future__ import annotations
@@ -20,12 +20,12 @@ from velatura.films.tables import Coated
 from velatura.model import fitted
 from velatura.model.guards import ALPHA_MIN, COS_AT_FACETS_MIN, SIN_AT_FACETS_MAX
 from velatura.ops import Value
-from velatura.optics import fresnel, ggx, refraction
+from velatura.optics import fresnel, ggx, microsurface, refraction
 from velatura.optics.ggx import Direction
 from velatura.renderer import compiled
 from velatura.renderer.compiled import Found, Number
 from velatura.renderer.kept import Kept
-from velatura.renderer.low_discrepancy import STEPS, fibonacci
+from velatura.renderer.low_discrepancy import fibonacci
 from velatura.stack import InterfaceValues
 from velatura.tables import coordinates
 from velatura.tables.microsurface_walks import shares_in_the_end
@@ -36,6 +36,10 @@ DIGITS = 9  # of indices that are alike
 BRUSHED = 0.05  # difference of two roughnesses, as share of the larger, from which normals do not turn with the light
 WALKED = 16  # directions of walks between facets with films
 PATHS = 2048  # from each
+ONWARD_FROM = 0.1, 0.2  # roughness of dielectrics from which later events are looked at, and all light leaves by them
+# Steps of the numbers of second and third events: of 738 sets of roots of primes one by which few normals say nearly
+# what walks through single interfaces do
+STEPS = tuple(prime**0.5 % 1 for prime in (103, 73, 89, 83, 19, 59, 37))
 KEPT = Kept(128 << 20)  # layers, and what they are made of
 
 
@@ -110,14 +114,12 @@ class Facets:
 
     @property
     def onward(self) -> float:
-        """Share of the light that meets rough facets often, and passes, which leaves as it does after second events:
-        the more, the less the step of the index turns it."""
+        """Share of the light that meets facets of a dielectric often which leaves as it does after second and third
+        events: all where they are rough enough to block some."""
         if self.opaque or self.final:
             return 0.0
-        begin, whole = fitted.ONWARD_FROM
-        rough = min(max((mean_alpha(self) - begin) / (whole - begin), 0.0), 1.0)
-        little = float(np.exp(-((self.step / fitted.ONWARD_STEP) ** 2)))
-        return rough * (fitted.ONWARD + (1 - fitted.ONWARD) * little)
+        begin, whole = ONWARD_FROM
+        return min(max((mean_alpha(self) - begin) / (whole - begin), 0.0), 1.0)
 
     @property
     def ratio(self) -> float:
@@ -239,15 +241,30 @@ class FirstShares:
         return cls(kept, passed, reflected, refracted, rest[:1], second, twice - second)
 
 
+class _Way(NamedTuple):
+    """Light that leaves a facet, as it is seen from its own medium, which lies upside down below the interface: its
+    direction of travel, the rank of the facet's height, weights by colour, and the shares of it that others have let
+    come to that facet, and that meets no other one."""
+
+    w: Direction
+    rank: Value
+    weights: Sequence[Value]
+    comes: Value
+    leaves: Value
+
+    def light(self, n: Value) -> Light:
+        """What leaves, in a medium of index n."""
+        return Light(n * self.w[0], n * self.w[1], [self.comes * self.leaves * weight for weight in self.weights])
+
+
 @dataclass(frozen=True)
 class FirstEvents:
     """First events: light that facets reflect, and refract, weighted for each of the ways to mask it, by colour; and
     the shares of `FirstShares` that the last way blocks.
 
     `ways` says whether masking is correlated with the height of facets, as what follows needs (Heitz et al. 2016);
-    otherwise it is separable. With `again`, there is also the light of second events, of what the last way blocks: what
-    is reflected twice, and unless facets are opaque what then passes; and of what was refracted at first, what is
-    reflected back inside, and what leaves.
+    otherwise it is separable. With `again`, there is also the light of second and third events, of what the last way
+    blocks, of each outcome of each outcome, reflected ones before refracted ones.
     """
 
     facets: Facets
@@ -261,9 +278,9 @@ class FirstEvents:
 
     @property
     def lights(self) -> int:
-        """How many lights there are: each outcome of each first one, of second events."""
+        """How many lights there are: each outcome of each first one, of second events, and of third ones."""
         first = self.facets.outcomes
-        return first + (first * first if self.again else 0)
+        return first + (first**2 + first**3 if self.again else 0)
 
     @property
     def kind(self) -> Hashable:
@@ -307,7 +324,6 @@ class FirstEvents:
         lights = [Light(n * o[0], n * o[1], [r * share * each for each in kept for r in reflectance])]
         blocked = 1 - kept[-1]
         others = [r * share * blocked for r in reflectance]
-        again, twice = self._second(o, others, u_2 / share, values) if self.again else ([], [])
         if not self.facets.opaque:
             x, y, z = refraction.refract_at(wi, h, cosine, eta)
             through = []
@@ -317,34 +333,68 @@ class FirstEvents:
             below = n * eta
             lights.append(Light(below * x, below * y, [t * share * each for each in through for t in passing]))
             others += [t * share * (1 - through[-1]) for t in passing]
-            if self.again:
-                # What meets facets from below is seen upside down
-                inside = [ops.select(z < 0, each, 0.0) for each in others[len(passing) :]]
-                turned = below, alpha_u, alpha_v, 0.0, 1 / eta, 0.0, 0.0, *(1 / index for index in colours)
-                from_below = replace(self, facets=self.facets.reversed())
-                again += from_below._second((x, y, -1 * z), inside, u_2 / share, turned)[0]
+        again, twice = self._later(wi, h, u_2 / share, values) if self.again else ([], [])
         return [*lights, *again], [*others, blocked * share, *twice]
 
-    def _second(
-        self, travels: Direction, weights: Sequence[Value], number: Value, numbers: Sequence[Value]
+    def _later(
+        self, wi: Direction, h: Direction, number: Value, values: Sequence[Value]
     ) -> tuple[list[Light], list[Value]]:
-        """Light of samples of running numbers that has been reflected, upwards or downwards, and meets another facet:
-        reflected past others, and refracted; and all that is reflected."""
-        n, alpha_u, alpha_v, _, eta, _, _, *colours = numbers
-        u_3, u_4 = (number * step - ops.floor(number * step) for step in STEPS)
-        wi = -travels[0], -travels[1], -travels[2]
-        h = ggx.sample_visible(wi, alpha_u, alpha_v, u_3, u_4)
+        """Light of second and third events of samples of running numbers, which first meet normals h; and all that is
+        reflected twice."""
+        n, alpha_u, alpha_v, _, eta, straight, share, *colours = values
+        alpha = alpha_u, alpha_v
+        u = [number * step - ops.floor(number * step) for step in STEPS]
+        sides = [(self, eta, colours)]
+        if not self.facets.opaque:
+            # What lies below is seen upside down
+            sides.append((replace(self, facets=self.facets.reversed()), 1 / eta, [1 / index for index in colours]))
+        rank = microsurface.fly((-wi[0], -wi[1], -wi[2]), 1.0, *alpha, u[0])
+        first = self._outcomes(wi, h, rank, [share] * self.colours, 1.0, alpha, eta, colours)
+        # A share of what is refracted passes all other facets
+        met = [way._replace(comes=1 - straight * k) for k, way in enumerate(first)]
+        now, each = list(enumerate(met)), []
+        for fly, *of_normal in (u[1:4], u[4:]):
+            then = []
+            for side, way in now:
+                events, *indices = sides[side]
+                rank = ops.minimum(microsurface.fly(way.w, way.rank, *alpha, fly * (1 - way.leaves)), 1.0)
+                back = -way.w[0], -way.w[1], -way.w[2]
+                h = ggx.sample_visible(back, *alpha, *of_normal)
+                outcomes = events._outcomes(back, h, rank, way.weights, way.comes * (1 - way.leaves), alpha, *indices)
+                then += [((side + k) % 2, outcome) for k, outcome in enumerate(outcomes)]
+            now = then
+            each += now
+        (_, twice), *others = each
+        if self.facets.opaque:
+            # Means over heights are known; outcomes of others have the same heights, and so their proportions
+            comes, leaves = _reflected_twice(wi, first[0].w, twice.w, alpha)
+            twice = twice._replace(comes=comes, leaves=leaves)
+        lights = [twice.light(n), *(way.light(n * eta if side else n) for side, way in others)]
+        return lights, [twice.comes * weight for weight in twice.weights]
+
+    def _outcomes(
+        self,
+        wi: Direction,
+        h: Direction,
+        rank: Value,
+        weights: Sequence[Value],
+        comes: Value,
+        alpha: tuple[Value, Value],
+        eta: Value,
+        colours: Sequence[Value],
+    ) -> list[_Way]:
+        """What a facet of normal h reflects, and unless it is opaque refracts."""
         cosine = ops.minimum(ggx.dot(wi, h), 1.0)
         reflectance, passing = self._divided(cosine, eta, colours)
-        x, y, z = ggx.reflect(wi, h)
-        seen = ops.select(z > 0, ggx.masking((x, y, ops.absolute(z)), alpha_u, alpha_v), 0.0)
-        twice = [r * weight for r, weight in zip(reflectance, weights)]
-        found = [Light(n * x, n * y, [seen * each for each in twice])]
-        if self.facets.opaque:
-            return found, twice
-        x, y, z = refraction.refract_at(wi, h, cosine, eta)
-        through = [ops.select(z < 0, t * weight, 0.0) for t, weight in zip(passing, weights)]
-        return [*found, Light(n * eta * x, n * eta * y, through)], twice
+        o = ggx.reflect(wi, h)
+        ways = [(o, rank, reflectance)]
+        if not self.facets.opaque:
+            x, y, z = refraction.refract_at(wi, h, cosine, eta)
+            ways.append(((x, y, -1 * z), 1 - rank, passing))
+        return [
+            _Way(w, at, [share * x for share, x in zip(shares, weights)], comes, microsurface.escape(w, at, *alpha))
+            for w, at, shares in ways
+        ]
 
     def _divided(self, cosine: Value, eta: Value, colours: Sequence[Value]) -> tuple[list[Value], list[Value]]:
         """Shares that facets reflect, and let pass, by colour."""
@@ -378,6 +428,22 @@ def _smith(w: Direction, alpha: tuple[Value, Value]) -> Value:
     x, y = alpha[0] * w[0], alpha[1] * w[1]
     z = ops.maximum(w[2], COS_AT_FACETS_MIN * 0.1)
     return 0.5 * (ops.sqrt(1 + (x * x + y * y) / (z * z)) - 1)
+
+
+def _reflected_twice(
+    wi: Direction, first: Direction, second: Direction, alpha: tuple[Value, Value]
+) -> tuple[Value, Value]:
+    """Shares, means over heights, of light from wi that is reflected towards `first` and meets another facet, and of
+    that which then leaves towards `second`.
+
+    From above light meets a facet below a rank r in the share r^a, a = 1 + Lambda(wi). It leaves upwards in the share
+    r^b, b = Lambda(first); downwards it goes on to a rank below s in the share (s / r)^b, b = 1 + Lambda(first).
+    """
+    a, b, c = 1 + _smith(wi, alpha), *(_smith((w[0], w[1], ops.absolute(w[2])), alpha) for w in (first, second))
+    up = first[2] > 0
+    comes = ops.select(up, b / (a + b), 1.0)
+    leaves = ops.select(second[2] > 0, a / (a + c) * ops.select(up, 1.0, (1 + b) / (1 + b + c)), 0.0)
+    return comes, leaves
 
 
 def mean_alpha(facets: Facets) -> float:

@@ -11,7 +11,7 @@ import functools
 from collections.abc import Callable, Hashable, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
-from typing import NamedTuple, TypeVar
+from typing import Any, NamedTuple, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -159,12 +159,12 @@ def scaled(share: Callable[[Array], Array], setting: Setting) -> Operator:
 @dataclass(frozen=True)
 class _Met:
     """First events of all sources: what they reflect and refract, deposited (C, modes, N, sources) for all ways to mask
-    light, and their shares; and of brushed interfaces what second events reflect, and let pass."""
+    light, and their shares; and of interfaces whose later events are looked at what these reflect, and let pass."""
 
     reflected: Array
     refracted: Array | None
     shares: FirstShares
-    second: tuple[Array, ...] = ()
+    later: tuple[Array, ...] = ()
 
     @classmethod
     def of_each(cls, facets: Facets, sources: Sequence[tuple[Array, Array]], setting: Setting) -> list[_Met]:
@@ -191,24 +191,26 @@ class _Met:
     @classmethod
     def _of(cls, facets: Facets, p: Array, psi: Array, setting: Setting) -> _Met:
         again = max(facets.across, facets.onward) > 0 and setting.often is not None
-        events = FirstEvents(facets, tuple(setting.ways), again)
+        events, samples = FirstEvents(facets, tuple(setting.ways), again), setting.samples
         lights, others = setting.basis.deposited(
-            events, p, psi, fibonacci(setting.samples), events.numbers(setting.samples), events.kind
+            events, p, psi, fibonacci(samples), events.numbers(samples), events.kind
         )
         # Stencils keep the energy
         totals = [light[-events.colours :, 0].sum(axis=1) for light in lights]
         shares = FirstShares.beside(facets, totals, others)
-        lights, second = lights[: facets.outcomes], lights[facets.outcomes :]
-        if len(second) > 1:
-            # Light that is reflected inside passes
-            second = [second[0] + second[3], second[1] + second[2]]
-        return cls(lights[0], None if facets.opaque or facets.final else lights[1], shares, tuple(second))
+        lights, later = lights[: facets.outcomes], lights[facets.outcomes :]
+        sides: list[Any] = [0.0] * (facets.outcomes if again else 0)
+        for number, light in enumerate(later):
+            # What an even number of facets refracts leaves above
+            path = number if number < facets.outcomes**2 else number - facets.outcomes**2
+            sides[path.bit_count() % 2 if facets.outcomes > 1 else 0] += light
+        return cls(lights[0], None if facets.opaque or facets.final else lights[1], shares, tuple(sides))
 
     def _of_some(self, sources: slice | NDArray[np.integer]) -> _Met:
         """Some of the sources of isotropic facets."""
         refracted = None if self.refracted is None else self.refracted[..., sources]
         shares = FirstShares(*(x[:, sources] for x in vars(self.shares).values()))
-        return _Met(self.reflected[..., sources], refracted, shares, tuple(x[..., sources] for x in self.second))
+        return _Met(self.reflected[..., sources], refracted, shares, tuple(x[..., sources] for x in self.later))
 
 
 class _Blocked(NamedTuple):
@@ -269,12 +271,11 @@ def _outcomes(
     sines = _sines(facets, setting.p) if beams else own.sines
     often = []
     for k, (light, share) in enumerate(zip(first, shares)):
-        # The less facets turn light that is blocked, the more of it goes on as it came. Brushed ones, which keep its
-        # momentum along them, send what they reflect where second events do, and a share of what passes; rough ones a
-        # share of what passes
-        exact = max(fitted.PASSED_ON * facets.across, facets.onward) if k else facets.across
+        # Rough dielectrics, and brushed interfaces, which keep the momentum of light along them, send it where second
+        # and third events do. The less others turn light that is blocked, the more of it goes on as it came
+        exact = max(facets.across, facets.onward)
         if exact:
-            light = light + exact * project(_second(facets, setting, met.second[k], share))
+            light = light + exact * project(_later(facets, setting, met.later[k], share))
         if exact < 1:
             # It leaves in the directions in which light is blocked there
             there = blocked[1] if k else own
@@ -295,11 +296,11 @@ def _swing(facets: Facets) -> float:
     return fitted.SWING * float(np.exp(-fitted.SWING * turn))  # model.md, Eq. 4
 
 
-def _second(facets: Facets, setting: Setting, light: Array, share: Array) -> Array:
-    """Light of second events, of which sources have a share (C, sources)."""
+def _later(facets: Facets, setting: Setting, light: Array, share: Array) -> Array:
+    """Light of later events, of which sources have a share (C, sources)."""
     basis = setting.basis
     weights = np.maximum(basis.nodes.weights(float(ops.mean(facets.above))), 0)
-    # A trace leaves evenly, for sources of which second events reflect, or let pass, nothing
+    # A trace leaves evenly, for sources of which later events reflect, or let pass, nothing
     sources = np.ones((len(share), len(basis.azimuths) * basis.nodes.count))
     light = light + TRACE * basis.rows(sources, 0.0)[..., None] * weights[:, None] / weights.sum()
     return np.asarray(light * (share / light[:, 0].sum(axis=1))[:, None, None])
