@@ -41,6 +41,8 @@ from velatura.stack import Interface, Stack, Texture, rgb
 Run = Callable[..., tuple[int, str, str]]
 Made = Callable[[str], dict[str, Any]]
 
+pytestmark = pytest.mark.usefixtures("one_thread")
+
 SMALL: dict[str, dict[str, Any]] = {
     "before-after": {"presets": ("frosted-metal",), "size": 16, "spp": 2},
     "films-under-coats": {
