@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import shutil
 from collections.abc import Callable, Generator, Iterator
 from typing import Any
 
@@ -38,8 +37,7 @@ def running(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Server]:
 def served(running: Server) -> Iterator[Server]:
     """The server, whose folder is empty at first."""
     yield running
-    for path in running.folder.iterdir():
-        shutil.rmtree(path) if path.is_dir() else path.unlink()
+    running.clear()
 
 
 @pytest.fixture(scope="module")
