@@ -31,7 +31,7 @@ from dataclasses import dataclass, is_dataclass, replace
 from functools import reduce
 from itertools import accumulate
 from math import pi
-from typing import Any, TypeVar
+from typing import Any, NamedTuple, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -56,7 +56,7 @@ from velatura.ops import Value
 from velatura.optics import fresnel, ggx
 from velatura.optics.ggx import Direction
 from velatura.renderer import compiled, low_discrepancy
-from velatura.renderer.compiled import Found, Number
+from velatura.renderer.compiled import Colour, Found, Number
 from velatura.renderer.directional_grid import Curves
 from velatura.stack import InterfaceValues, Material, SlabValues
 from velatura.stack.chain import chain
@@ -272,15 +272,16 @@ def _components(
     own: Sequence[Value],
     below: Sequence[Value],
     d: Momentum | None = None,
+    widths_above: Sequence[Variance] | None = None,
 ) -> list[_Component]:
     """The component of each interface for its `own` step, and those of `above` and `below` that light makes at the
-    interfaces there; d is the sum of its moves, None for little. A single interface has its own roughness, and all the
-    weight."""
+    interfaces there, of `widths_above` if these are known; d is the sum of its moves, None for little. A single
+    interface has its own roughness, and all the weight."""
     refractions, last = transmission.refractions, len(own) - 1
     sizes = [ops.maximum(refraction.sign * step, refraction.least) for refraction, step in zip(refractions, own)]
     if not last:
         return [_Component(sizes[0], refractions[0].roughness, 1.0)]
-    widths_above = _from_top([_width(*each) for each in zip(refractions, above)], operator.add)
+    widths_above = widths_above or _widths_above(transmission, above)
     widths_below = _from_bottom([_width(*each) for each in zip(refractions, below)], operator.add)
     over, at, under = ([_weight(*each) for each in zip(refractions, steps)] for steps in (above, own, below))
     over_all, under_all = _from_top(over, operator.add), _from_bottom(under, operator.add)
@@ -300,6 +301,11 @@ def _components(
             weight, total = weights[j], reduce(operator.add, weights)
         found.append(_Component(size, width.roughness(WIDTHS), weight / total))
     return found
+
+
+def _widths_above(transmission: Transmission, steps: Sequence[Value]) -> list[Variance]:
+    """Widths of the moves of light at all interfaces down to each one."""
+    return _from_top([_width(*each) for each in zip(transmission.refractions, steps)], operator.add)
 
 
 def _width(refraction: Refraction, step: Value) -> Variance:
@@ -332,6 +338,32 @@ def _drawn(transmission: Transmission, i: MomentumInSlabs) -> tuple[list[_Compon
     return components, [share / total for share in shares]
 
 
+@dataclass(frozen=True)
+class _Arriving:
+    """Light from one direction above: its momentum; widths of its moves down to each interface; the components that are
+    drawn of it, and their probabilities; masking by each interface, as it is and as it is drawn; the mean share that it
+    lets pass where it is smooth, and the share (a colour) that comes to it."""
+
+    momentum: MomentumInSlabs
+    widths: Sequence[Variance]
+    drawn: Sequence[_Component]
+    shares: Sequence[Value]
+    alone: Sequence[Value]
+    masked: Sequence[Value]
+    evenly: Sequence[Value]
+    comes: Sequence[Value]
+
+    @classmethod
+    def of(cls, transmission: Transmission, wi: Direction) -> _Arriving:
+        i = entered(transmission, wi)
+        widths = _widths_above(transmission, i.steps) if len(i.steps) > 1 else []
+        drawn, shares = _drawn(transmission, i)
+        alone = [_masking(x.roughness, i, j) for j, x in enumerate(transmission.refractions)]
+        masked = [_masking(x.roughness, i, j) for j, x in enumerate(drawn)]
+        comes = [x * y for x, y in zip(_smooth_above(i), _from_top(i.slabs, operator.mul))]
+        return cls(i, widths, drawn, shares, alone, masked, [*map(ops.mean, i.passes)], comes)
+
+
 def chances(transmission: Transmission, wi: Direction) -> list[Value]:
     """Share of samples of light from wi that meet facets of each interface, from the top."""
     return _drawn(transmission, entered(transmission, wi))[1]
@@ -342,39 +374,40 @@ def eval_pdf(transmission: Transmission, wi: Direction, wo: Direction) -> tuple[
 
     wi lies above. Radiance is not scaled by the index. The value is 0 for wo above.
     """
-    return _eval_pdf(transmission, wi, wo)
+    value, density = _eval_pdf(transmission, _Arriving.of(transmission, wi), wo)
+    lit = wi[2] > 0
+    return ops.select(lit, value, 0.0), ops.select(lit, density, 0.0)
 
 
-def _eval_pdf(transmission: Transmission, wi: Direction, wo: Direction, passes: bool = False) -> tuple[Value, Value]:
-    """Like `eval_pdf`; `passes` if all wo lie below."""
-    n = transmission.indices
+def _eval_pdf(
+    transmission: Transmission, arriving: _Arriving, wo: Direction, passes: bool = False
+) -> tuple[Value, Value]:
+    """Like `eval_pdf`, for light from above; `passes` if all wo lie below."""
+    n, i = transmission.indices, arriving.momentum
     below, cos_o = wo[2] < 0, ops.absolute(wo[2])
     n_out = ops.select(below, n[-1], n[0])
-    i = entered(transmission, wi)
     o = _crossed(
         transmission, (n_out * wo[0], n_out * wo[1]), cos_o, cos_o
     )  # no part reads the cosine on the side of wi and that beyond
     d = o.p[0] - i.p[0], o.p[1] - i.p[1]
-    drawn, shares = _drawn(transmission, i)
     own = [c.n_1 * i.bounded[j] - c.n_2 * o.bounded[j + 1] for j, c in enumerate(transmission.refractions)]
-    components = _components(transmission, i.steps, own, o.steps, d)
-    above, below_all = _smooth_above(i), _smooth_below(o)
-    slabs_above, slabs_below = _from_top(i.slabs, operator.mul), _from_bottom(o.slabs, operator.mul)
+    components = _components(transmission, i.steps, own, o.steps, d, arriving.widths)
+    below_all, slabs_below = _smooth_below(o), _from_bottom(o.slabs, operator.mul)
     lowest = _from_bottom(n, ops.minimum)
     value: Value = 0.0
     density: Value = 0.0
     for j, (refraction, component, sampled, share) in enumerate(
-        zip(transmission.refractions, components, drawn, shares)
+        zip(transmission.refractions, components, arriving.drawn, arriving.shares)
     ):
         with ops.block(f"Pass by a facet of interface {j}"):
             facet = _facet(refraction, i, o, j, component.step)
-            alone = _masking(refraction.roughness, i, j) * _masking(refraction.roughness, o, j + 1)
+            alone = arriving.alone[j] * _masking(refraction.roughness, o, j + 1)
             turns = _turns(refraction.sign)
-            smooth = above[j] * slabs_above[j] * (below_all[j] * slabs_below[j + 1])
+            smooth = arriving.comes[j] * (below_all[j] * slabs_below[j + 1])
             seen = component.weight * _slopes(component.roughness, facet.slope) * ops.select(turns, alone, 1.0)
             value = value + smooth * facet.passes * seen  # model.md, Eq. 9
-            visible = ops.mean(facet.passes) * _masking(sampled.roughness, i, j)
-            evenly = ops.mean(i.passes[j]) / (component.step * component.step)
+            visible = ops.mean(facet.passes) * arriving.masked[j]
+            evenly = arriving.evenly[j] / (component.step * component.step)
             through = _slopes(sampled.roughness, facet.slope) * ops.select(turns, visible, evenly)
             through = ops.select(o.p2 < lowest[j + 1] * lowest[j + 1], through, 0.0)
         with ops.block("Or be reflected by it"):
@@ -382,8 +415,8 @@ def _eval_pdf(transmission: Transmission, wi: Direction, wo: Direction, passes: 
                 through = ops.select(below, through, _reflected(transmission, i, o, j, sampled.roughness))
             density = density + share * through
     # From momentum to solid angle
-    lit, scale = wi[2] > 0, n_out * n_out * cos_o
-    return ops.select(lit & below, value * scale, 0.0), ops.select(lit, density * scale, 0.0)
+    scale = n_out * n_out * cos_o
+    return ops.select(below, value * scale, 0.0), density * scale
 
 
 def sample(transmission: Transmission, wi: Direction, u: Value, u1: Value, u2: Value) -> Direction:
@@ -555,7 +588,12 @@ def integrals(
     rays = np.tile(share, nodes[1]), np.tile(weight * (pi / nodes[1]), nodes[1])
     around = np.repeat(np.cos(phi), nodes[0]), np.repeat(np.sin(phi), nodes[0])
     alone = Transmission(tuple(map(_numbered, transmission.refractions)), transmission.slabs, (), (), (), False, False)
-    found, _, _ = compiled.over(_passed, (*wi, *middle), (*rays, *around), wider(alone))
+    # A kernel reads what depends on wi alone, which would be a third of it to compile
+    arriving, rows = _Arriving.of(transmission, wi), list[Array]()
+    arriving = replace(arriving, momentum=replace(i, n=[], cosines=[], passes=[], slabs=[]))
+    arriving = replace(arriving, comes=[*np.broadcast_arrays(*map(np.atleast_2d, arriving.comes))])
+    numbers = wider(alone), _placed(arriving, rows, len(i.p2)), Colour(np.ones((compiled.COLOURS, 1, 1)))
+    found, _, _ = compiled.over(_passed, (*middle, *rows), (*rays, *around), numbers)
     *energy, passes = found
     count = len(energy) // 2
     return np.array(energy[:count]), np.array(energy[count:]), passes
@@ -576,8 +614,35 @@ def _numbered(refraction: Refraction) -> Refraction:
     return replace(found, roughness=Roughness(*map(number, refraction.roughness)), width=width)
 
 
-def _passed(sources: Sequence[Value], samples: Sequence[Value], transmission: Transmission) -> Found:
-    wi_x, wi_y, wi_z, p_x, p_y, u, v, cosine, sine = sources
+class _Rows(NamedTuple):
+    """The place of a value among those of sources: the first of its rows, and how many channels it has."""
+
+    first: int
+    channels: int
+
+
+def _placed(values: _Arriving, rows: list[Array], count: int) -> _Arriving:
+    """The places of values of sources among `rows`, which gets them, (count,) each."""
+
+    def place(value: Any) -> Any:
+        if isinstance(value, float) and value == 0:
+            return value
+        each = np.atleast_2d(value)
+        rows.extend(np.broadcast_to(each, (len(each), count)))
+        return _Rows(len(rows) - len(each), len(each))
+
+    found: _Arriving = mapped(values, np.ndarray | float, place)
+    return found
+
+
+def _passed(sources: Sequence[Value], samples: Sequence[Value], numbers: Any) -> Found:
+    transmission, arriving, colour = numbers
+    p_x, p_y, u, v, cosine, sine, *rows = sources
+
+    def value(at: _Rows) -> Value:
+        return colour(*rows[at.first : at.first + at.channels]) if at.channels > 1 else rows[at.first]
+
+    arriving = mapped(arriving, _Rows, value)
     share, weight, *around = samples
     n = transmission.indices[-1]
     along_u, along_v = u * around[0], v * around[1]
@@ -591,20 +656,24 @@ def _passed(sources: Sequence[Value], samples: Sequence[Value], transmission: Tr
     x, y = (p_x + r * ray[0]) / n, (p_y + r * ray[1]) / n
     z = ops.sqrt(ops.maximum(1 - x * x - y * y, 1e-12))
     area = weight * most * ((1 + odds) * (1 + odds) * u * v / (n * n * z))
-    value, density = _eval_pdf(transmission, (wi_x, wi_y, wi_z), (x, y, -1 * z), True)
+    value, density = _eval_pdf(transmission, arriving, (x, y, -1 * z), True)
     return Found([value * area, value * area * ops.divide(value, density), density * area])
 
 
 def wider(values: Any) -> Any:
     """Records of arrays, with one axis more; tables stay as they are."""
-    if isinstance(values, np.ndarray):
-        return values[..., None]
+    return mapped(values, np.ndarray, lambda value: value[..., None])
+
+
+def mapped(values: Any, kind: Any, change: Callable[[Any], Any]) -> Any:
+    """Records with their values of a kind changed; tables stay as they are."""
+    if isinstance(values, kind):
+        return change(values)
     if isinstance(values, Curves):
         return values
-    if isinstance(values, Roughness):
-        return Roughness(*map(wider, values))
-    if isinstance(values, tuple):
-        return tuple(map(wider, values))
+    if isinstance(values, tuple | list):
+        each = [mapped(value, kind, change) for value in values]
+        return type(values)(*each) if hasattr(values, "_fields") else type(values)(each)
     if is_dataclass(values) and not isinstance(values, type):
-        return type(values)(**{name: wider(x) for name, x in vars(values).items()})
+        return type(values)(**{name: mapped(value, kind, change) for name, value in vars(values).items()})
     return values
