@@ -238,7 +238,7 @@ def sampled(material: MaterialLike, skies: Sequence[Array], size: int, samples: 
     asked = Query(radiance=False)
     wo = np.array(np.broadcast_arrays(*body.sample(wi, u.ravel(), u1.ravel(), u2.ravel(), asked)))
     w = np.einsum("kan,kns->ans", frame, wo.reshape(3, count, samples))
-    pictures = []
+    pictures: list[Array] = []
     for sky in skies:
         drawn = np.concatenate([w, _towards_lights(sky, (count, samples), generator)], axis=-1)
         each = np.einsum("kan,ans->kns", frame, drawn).reshape(3, -1)
