@@ -33,7 +33,7 @@ COS_MIN, COS_MAX = 0.02, 1 - 1e-6  # of directions at nodes, which all have an a
 SAMPLES = 1024  # of a part at a node, of which a plane's blurs are fitted to a quarter
 FAINT = 1e-4  # energy, below which a part is left out
 MOST = {LINE: 4, PLANE: 6}  # blurs, but one at least for each part
-NEAR = 0.001  # distance times energy and alpha, from which a part gets no further blur
+NEAR = 0.005  # distance times energy and alpha, from which a part gets no further blur
 
 
 @dataclass(frozen=True)
