@@ -232,19 +232,21 @@ def _compiled(
 
 def release_kernels() -> None:
     """Release all kernels of Dr.Jit, which keeps each one, if many serve no kind that is kept. Those that are asked for
-    again are read from its cache on disk. Nothing happens while another thread works with Mitsuba."""
+    again are read from its cache on disk. Nothing happens while another thread works with Mitsuba, or launches one."""
     global _unused
     import drjit as dr
 
     if _unused < UNUSED:
         return
     with kernel.exclusive.at_once() as alone:
-        if alone:
-            with _launching:
+        if alone and _launching.acquire(blocking=False):
+            try:
                 dr.sync_thread()
                 _kernels.clear()  # launches need the kernels that they have recorded
                 dr.flush_kernel_cache()
                 _unused = 0
+            finally:
+                _launching.release()
 
 
 def _kernel(
