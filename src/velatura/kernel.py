@@ -325,7 +325,7 @@ def threads_restored() -> Iterator[None]:
 
 @contextlib.contextmanager
 def compiled_first() -> Iterator[None]:
-    """In the block, run by kernels what has any, the first time as well: what is found is then the same, bit by bit,
+    """Run by kernels, in the block, all that has any, the first time as well: results are then the same, bit by bit,
     whatever this process has computed before, or others have left on disk."""
     before = _compiled_first.set(True)
     try:

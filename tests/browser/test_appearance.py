@@ -75,11 +75,14 @@ def answered(visit: Visit) -> None:
     visit.page.wait_for_function("() => !velatura.store.dragging")
 
 
+# At once, since the page may write its own value meanwhile
+MOVE = "(slider, tick) => { slider.value = tick; slider.dispatchEvent(new Event('input', { bubbles: true })); }"
+
+
 def drag(slider: Any, ticks: tuple[int, ...]) -> None:
     """Drag a slider over its ticks as a hand does: a change follows where it is let go."""
     for tick in ticks:
-        slider.evaluate("(slider, tick) => (slider.value = tick)", tick)
-        slider.dispatch_event("input")
+        slider.evaluate(MOVE, tick)
     slider.dispatch_event("change")
 
 

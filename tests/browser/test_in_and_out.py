@@ -126,7 +126,7 @@ def test_one_of_several_materials_and_an_object_or_its_material_are_asked_for(vi
     page.page.keyboard.press("Escape")
     assert page.state("name") == "Red"
     page.drop(("part.gltf", json.dumps(TRIANGLE)))
-    ask.get_by_role("button", name="The object").click()
+    ask.get_by_role("button", name="The object", exact=True).click()
     page.page.wait_for_function("() => velatura.store.get().view.object === 'file:part.gltf'")
     page.drop(("part.gltf", json.dumps(TRIANGLE)))
     ask.get_by_role("button", name="A material").click()

@@ -7,6 +7,7 @@ each of four parameters. The seeds are fixed.
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
@@ -18,10 +19,8 @@ from velatura import Interface, Medium, Stack, kernel
 from velatura.optics.polarisation import horizontal
 from velatura.stack import dumps
 
-mi = kernel.mitsuba("llvm_ad_mono_polarized")
+mi = kernel.mitsuba()
 import drjit as dr  # noqa: E402
-
-vt.register()
 
 GLASS, METAL = {"int_ior": 1.5, "ext_ior": 1.0}, {"eta": 0.2, "k": 3.9}
 GGX = {"distribution": "ggx", "alpha": 0.3}
@@ -30,6 +29,16 @@ CASES = {
     "glass": (Interface(eta=1.5, alpha=0.3), {"type": "pplastic", **GGX, **GLASS, "diffuse_reflectance": 0.0}),
 }
 BOUND = 3.3  # standard errors, which chance exceeds once in a thousand tests
+
+
+@pytest.fixture(autouse=True)
+def polarised() -> Iterator[None]:
+    """A polarised variant, and then the one before."""
+    before = mi.variant()
+    kernel.mitsuba("llvm_ad_mono_polarized")
+    vt.register()
+    yield
+    kernel.mitsuba(before)
 
 
 def made(*layers: Any, reflectance: str = "fgd") -> Any:

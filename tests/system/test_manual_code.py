@@ -54,6 +54,7 @@ ELSEWHERE = {
     "python benchmarks/fuzz.py": "it takes hours; tests/system/test_random_inputs.py runs a part",
     "python benchmarks/validation.py": "it takes two minutes; tests/unit/test_validation.py runs a part",
     "velatura benchmark truth": "it takes hours; tests/unit/test_benchmark.py walks through a part",
+    "mpiexec": "it needs MPI",
     "velatura edit --static": "it takes minutes; tests/browser/test_offline.py writes a part",
 }
 # Languages that are not run here, and why
@@ -119,7 +120,7 @@ def files_of_readme(folder: Path) -> None:
 
 
 def files_of_inverse(folder: Path) -> None:
-    further = "pane.yaml", "bright-edge.yaml", "flakes.yaml", "workshop.yaml", "lacquered.yaml"
+    further = "pane.yaml", "bright-edge.yaml", "wider-edge.yaml", "flakes.yaml", "workshop.yaml", "lacquered.yaml"
     names = "target.yaml", None, *further, "metal.yaml", "blue-over-red.yaml"
     for name, text in zip(names, written("docs/how-to/inverse.md", "yaml")):
         if name:

@@ -170,7 +170,8 @@ def test_a_bound_is_the_same_under_the_hand_and_at_rest() -> None:
     gold = Stack([vt.Interface(eta=1.5, alpha=0.05), vt.Medium(sigma_a=(0, 0.2, 0.8)), metal])
     now = seen(gold, Target([{"energy": 0.1}, {"energy": 0.1, "base": "conductor"}]), model)
     hand, rest = (answer(gold, now.with_energy(0, (0.4,) * 3), model, quick) for quick in (True, False))
-    assert rest.reason == "bright" and hand.part == pytest.approx(rest.part, rel=0.02)
+    assert rest.reason in ("bright", "energy")  # the metal and the clear medium above are both at their ends
+    assert hand.part == pytest.approx(rest.part, rel=0.02)
     coat, metal = rest.stack.stack.interfaces
     brightest = fresnel.normal_incidence(np.divide(metal.eta, coat.eta), np.divide(metal.k, coat.eta)).max()
     assert brightest == pytest.approx(CONDUCTOR_MAX, abs=1e-6)

@@ -47,7 +47,7 @@ def _shown(stack: Described, model: Model, angle: float) -> list[Answer]:
 
 
 def _coloured(shown: dict[str, Any]) -> dict[str, Any]:
-    """What is shown, its energy in three channels."""
+    """Numbers that are shown, with energies in three channels."""
     return {**shown, "energy": np.broadcast_to(shown["energy"], 3).tolist()}
 
 

@@ -239,8 +239,8 @@ def _held(wanted: Target, stack: Stack, model: Model) -> Target:
 
 
 def _loose(wanted: Target) -> Loose:
-    """What is asked of a lobe of the present material at a second angle, by the place of the lobe: at normal incidence
-    that does not stay."""
+    """Numbers that are asked of a lobe of the present material at a second angle, by the place of the lobe: at normal
+    incidence these do not stay."""
     if wanted.lobes:
         return frozenset()
     each = ((wish.lobe, key) for wish in wanted.grazing for key in wish.asked_for if getattr(wish, key) is not None)

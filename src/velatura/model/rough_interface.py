@@ -40,6 +40,8 @@ ONWARD_FROM = 0.1, 0.2  # roughness of dielectrics from which later events are l
 # Steps of the numbers of second and third events: of 738 sets of roots of primes one by which few normals say nearly
 # what walks through single interfaces do
 STEPS = tuple(prime**0.5 % 1 for prime in (103, 73, 89, 83, 19, 59, 37))
+# Values of facets that kernels read, or that change nothing of first events
+NUMBERS = ("above", "below", "k", "alpha_u", "alpha_v", "rotation", "final", "films")
 KEPT = Kept(128 << 20)  # layers, and what they are made of
 
 
@@ -116,7 +118,7 @@ class Facets:
     def onward(self) -> float:
         """Share of the light that meets facets of a dielectric often which leaves as it does after second and third
         events: all where they are rough enough to block some."""
-        if self.opaque or self.final:
+        if self.opaque:
             return 0.0
         begin, whole = ONWARD_FROM
         return min(max((mean_alpha(self) - begin) / (whole - begin), 0.0), 1.0)
@@ -253,7 +255,7 @@ class _Way(NamedTuple):
     leaves: Value
 
     def light(self, n: Value) -> Light:
-        """What leaves, in a medium of index n."""
+        """Light that leaves, in a medium of index n."""
         return Light(n * self.w[0], n * self.w[1], [self.comes * self.leaves * weight for weight in self.weights])
 
 
@@ -284,9 +286,10 @@ class FirstEvents:
 
     @property
     def kind(self) -> Hashable:
-        """All that is no number."""
+        """All that is no number, and what of the facets `numbers` leaves out."""
         facets = self.facets
-        return FirstEvents, facets.opaque, facets.below is None, self.colours, self.ways, self.again
+        others = tuple(value for name, value in vars(facets).items() if name not in NUMBERS)
+        return FirstEvents, facets.opaque, facets.below is None, self.colours, self.ways, self.again, others
 
     def numbers(self, samples: int) -> tuple[Any, ...]:
         """All numbers, and films, as `__call__` reads them."""
@@ -383,7 +386,7 @@ class FirstEvents:
         eta: Value,
         colours: Sequence[Value],
     ) -> list[_Way]:
-        """What a facet of normal h reflects, and unless it is opaque refracts."""
+        """Ways of light that a facet of normal h reflects, and unless it is opaque refracts."""
         cosine = ops.minimum(ggx.dot(wi, h), 1.0)
         reflectance, passing = self._divided(cosine, eta, colours)
         o = ggx.reflect(wi, h)

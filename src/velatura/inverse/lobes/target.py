@@ -224,7 +224,7 @@ class TargetLobe(Record):
         return any(self.fixed.of(key, n) is not None for key, n in pins)
 
     def below(self, count: int, energy: Iterable[float]) -> TargetLobe:
-        """What is left of the lobe, with an energy, below the first `count` of its interfaces."""
+        """The rest of the lobe, with an energy, below the first `count` of its interfaces."""
         fixed = {key: entries[count:] for key, entries in self.fixed}
         left = {"interfaces": self.interfaces - count, "energy": tuple(energy), "fixed": Fixed(**fixed)}
         return self.model_copy(update=left)
