@@ -113,8 +113,8 @@ def _found(stack: vt.Stack, rng: np.random.Generator, pattern: vt.Stack | None) 
             return float(light()[0])
 
         step = max(RELATIVES.get(at.role, RELATIVE), STEPS.get(at.role, 0) / float(np.abs(x).max()))
-        low, high = at.declared.within
-        ends = max(1 - step, low / x.max()), min(1 + step, high / x.max())
+        low, high = sorted(end / x.max() for end in at.declared.within)  # g may be negative
+        ends = max(1 - step, low), min(1 + step, high)
         found += judged(at, gradient, scaled, ends, whole, noise)
         scaled(1)
     return found
