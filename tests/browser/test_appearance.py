@@ -501,7 +501,7 @@ def test_what_cannot_be_had_is_said_beside_the_lobe(visit: Open) -> None:
 
 def test_a_lobe_of_three_interfaces_is_dragged(visit: Open) -> None:
     """Expected: three dielectrics with the lobe of one, then more energy than two of this blur have; one step each. Its
-    class has no map, with the reason; undone and read anew it is one lobe still."""
+    class has no map, with the reason."""
     page = visit()
     open_material(page, "Bati 2021, figure 15 c")
     look = panel(page)
