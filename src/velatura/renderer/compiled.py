@@ -32,8 +32,9 @@ from velatura.version import __version__
 
 Array = NDArray[Any]
 
-MANY = 250_000  # values of a kind, about half as long as a kernel of it takes to compile where none is kept on disk
-MANY_DEPOSITED = 400_000  # likewise of kinds with light that falls on rows, whose kernels are longer
+MANY = 100_000  # values of a kind, a fifth as long as a kernel of it takes to compile where none is kept on disk
+MANY_DEPOSITED = 200_000  # likewise of kinds with light that falls on rows, whose kernels are longer
+FEW_LIGHTS = 4  # of these, beyond which values take as long again
 LEAST = 2_000  # values at a time: for fewer, a kernel takes longer to launch than NumPy to run
 SHARED = 2_000_000  # values at a time, from which several threads run a kernel; see `_lanes`
 BLOCK = 1 << 15  # values at a time, which a processor's cache holds
@@ -42,7 +43,7 @@ KERNELS = 64  # kinds whose launches are kept
 UNUSED = 256  # kinds whose launches were kept, from which their kernels are released
 SIZES = 16  # of each: which numbers of sources, samples and rows are alike
 
-_asked: Counter[Hashable] = Counter()  # values so far, by kind
+_asked: Counter[Hashable] = Counter()  # values that NumPy has worked out, by kind
 _kernels: OrderedDict[Hashable, Any] = OrderedDict()
 _unused = 0  # kinds
 _launching = Lock()
@@ -103,15 +104,15 @@ def over(
     it depends on, `kind`. It runs by NumPy alone if other objects are among them.
     """
     count, width = samples[0].shape[-1], len(sources[0])
+    asked = None
     if width * count > LEAST:
         with contextlib.suppress(_Foreign):
             read = _Read([], [])
-            kind = function.__module__, function.__qualname__, kind, *(x.ndim for x in samples), _kind(numbers, read)
-            _asked[kind] += width * count
-            many = _asked[kind] > (MANY_DEPOSITED if rows else MANY)
-            kernels = kernel.llvm() if many or kernel.compiles_first() or _mark(kind).exists() else None
+            asked = function.__module__, function.__qualname__, kind, *(x.ndim for x in samples), _kind(numbers, read)
+            many = _asked[asked] > (MANY_DEPOSITED if rows else MANY)
+            kernels = kernel.llvm() if many or kernel.compiles_first() or _mark(asked).exists() else None
             if kernels:
-                return _compiled(kernels, kind, function, sources, samples, numbers, read, rows)
+                return _compiled(kernels, asked, function, sources, samples, numbers, read, rows)
     size = max(BLOCK // count, 1)
     found = []
     for first in range(0, max(width, 1), size):
@@ -119,6 +120,8 @@ def over(
         found.append(_plain(function, some, own, numbers, rows))
     sums, largest, deposits = zip(*found)
     lights = [np.concatenate(each, axis=-1) for each in zip(*deposits)]
+    if asked:
+        _asked[asked] += width * count * (1 + len(lights) // FEW_LIGHTS)
     return np.concatenate(sums, axis=-1), np.concatenate(largest, axis=-1), lights
 
 
