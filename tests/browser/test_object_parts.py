@@ -42,6 +42,7 @@ def test_a_part_of_an_object_has_a_material_of_its_own(visit: Open, served: Serv
     before = page.picture()
     page.page.get_by_role("button", name="Material of Bulb <b>").click()
     page.page.get_by_role("button", name="chalk.yaml", exact=True).click()
+    page.page.wait_for_function("() => velatura.store.get().parts")  # the file is read
     page.settled()
     assert [part["covers"] for part in page.state("parts")] == ["Bulb <b>", ""]
     after = page.picture()
@@ -100,6 +101,7 @@ def test_the_truth_is_that_of_a_dropped_object(visit: Open) -> None:
     dropped(page)
     page.page.get_by_role("button", name="Material of Bulb <b>").click()
     page.page.get_by_role("button", name="Gold", exact=True).click()
+    page.page.wait_for_function("() => velatura.store.get().parts")
     page.settled()
     page.page.get_by_label("Compare", exact=True).select_option("split")
     page.page.get_by_label("With", exact=True).select_option("truth")
