@@ -324,6 +324,14 @@ def test_a_scene_and_its_images_may_be_moved(run: Run, tmp_path: Path, monkeypat
     assert "layer0_alpha_u.data" in str(mi.traverse(mi.load_file(str(there / "scene.xml"))))
 
 
+def test_a_script_has_what_parts_of_a_mixture_cover(tmp_path: Path) -> None:
+    mix = vt.Mix.from_dict(
+        {"mix": [{"weight": 0.5, "material": "bare-gold", "covers": "Foot'}\""}, {"material": "coated-gold"}]}
+    )
+    (path,) = vt.export(mix, "python").save(tmp_path / "lamp.py")[:1]
+    assert runpy.run_path(str(path))["mix"] == mix
+
+
 @pytest.mark.parametrize("preset", PRESETS)
 def test_the_script_runs(preset: str, run: Run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Expected: it describes the same stack, and as a script renders it with the same model to the file named."""

@@ -56,6 +56,7 @@ def _layers(layers: Sequence[Mapping[str, Any]]) -> Iterator[str]:
 
 def _parts(parts: Sequence[Mapping[str, Any]]) -> Iterator[str]:
     for part in parts:
-        first, *rest = _described(part["material"])
-        yield f"({part.get('weight')!r}, {first}"
-        yield from (*rest[:-1], f"{rest[-1]}),")
+        first, *rest, last = _described(part["material"])
+        weight, covers = part.get("weight"), part.get("covers")
+        yield f"dict(weight={weight!r}, covers={covers!r}, material={first}" if covers else f"({weight!r}, {first}"
+        yield from (*rest, f"{last}),")
