@@ -325,8 +325,8 @@ def threads_restored() -> Iterator[None]:
 
 @contextlib.contextmanager
 def compiled_first() -> Iterator[None]:
-    """Run by kernels, in the block, all that has any, the first time as well: results are then the same, bit by bit,
-    whatever this process has computed before, or others have left on disk."""
+    """Run by kernels, in the block, all that has any, the first time as well: results then depend, bit by bit, neither
+    on what this process has computed before nor on what others have left on disk."""
     before = _compiled_first.set(True)
     try:
         yield

@@ -1,4 +1,4 @@
-"""A browser and the editor's server for all files of this folder; pages tell how a failed test left them."""
+"""A browser and the editor's server for all files of this folder; pages report how a failed test left them."""
 
 from __future__ import annotations
 

@@ -286,7 +286,7 @@ class FirstEvents:
 
     @property
     def kind(self) -> Hashable:
-        """All that is no number, and what of the facets `numbers` leaves out."""
+        """All that is no number, and values of the facets that `numbers` leaves out."""
         facets = self.facets
         others = tuple(value for name, value in vars(facets).items() if name not in NUMBERS)
         return FirstEvents, facets.opaque, facets.below is None, self.colours, self.ways, self.again, others

@@ -210,7 +210,7 @@ def _scatter(types: Any, layers: WalkedLayers, path: Path, out: WayOut | None, p
 
 def _gather(
     meeting: SurfaceMeeting,
-    events: Sequence[ScatteringEvent],
+    towards: Sequence[ScatteringEvent],
     out: WayOut,
     path: Path,
     down: Value,
@@ -218,12 +218,12 @@ def _gather(
     back: bool,
 ) -> None:
     """Add what paths send along the way out, or `back` to the last surface, where it is `kept`; at a surface by events
-    that add up."""
+    `towards` it that add up."""
     layers, at_surface, in_medium = meeting.layers, connect_surface, connect_medium
     if back:
         at_surface, in_medium = connect_back, connect_medium_back
     slab = ops.select(path.inside, path.slab, meeting.j + back)
-    for n, event in enumerate(events):
+    for n, event in enumerate(towards):
         gathered, light = at_surface(meeting, event, out, path, down), event.light and event.light.mirrored(down ^ True)
         if layers.scatters:
             gathered = ops.select(path.inside, in_medium(layers, out, path) if n == 0 else 0.0, gathered)

@@ -143,7 +143,7 @@ function openPanel(bar) {
     </div>
     ${groups.map((name) => some(name, byTitle(presets.filter(({ group }) => group === name))))}
     ${bar.library.view(sought, seek, (file) => close() || bar.files.openFile(file, take))}
-    ${!opening ? nothing : some('From the papers', targets, html`<p>${bar.lacks('targets') || 'On their way.'}</p>`)}
+    ${opening ? some('From the papers', targets, html`<p>${bar.lacks('targets') || 'On their way.'}</p>`) : nothing}
   </dialog>`;
 }
 

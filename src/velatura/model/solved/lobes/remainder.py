@@ -190,10 +190,10 @@ def fit(
 def _solved(parts: Sequence[tuple[Array, Array]], columns: Sequence[Sequence[Array]]) -> Array:
     """Least squares of parts, each of numbers of its own, and of columns that all parts share, whose numbers are not
     negative: those that would be are left out."""
+    from scipy.linalg import block_diag  # slow to load
+
     kept = list(range(len(columns)))
     while kept:
-        from scipy.linalg import block_diag  # slow to load
-
         rows = block_diag(*(rows for rows, _ in parts))
         shared = np.stack([np.concatenate(columns[k]) for k in kept], axis=-1)
         target = np.concatenate([target for _, target in parts])

@@ -326,9 +326,11 @@ def _length2(refraction: Refraction, d: Momentum) -> Value:
     return x * x * (alpha_v / alpha_u) + y * y * (alpha_u / alpha_v)
 
 
-def _drawn(transmission: Transmission, i: MomentumInSlabs) -> tuple[list[_Component], list[Value]]:
+def _drawn(
+    transmission: Transmission, i: MomentumInSlabs, widths_above: Sequence[Variance] | None = None
+) -> tuple[list[_Component], list[Value]]:
     """The components as they are sampled, as wide as at p_o = p_i, and their probabilities."""
-    components = _components(transmission, i.steps, i.steps, i.steps)
+    components = _components(transmission, i.steps, i.steps, i.steps, None, widths_above)
     if len(components) == 1:
         return components, [1.0]
     # Leave out parts that light does not reach; it always reaches the first interface
@@ -357,7 +359,7 @@ class _Arriving:
     def of(cls, transmission: Transmission, wi: Direction) -> _Arriving:
         i = entered(transmission, wi)
         widths = _widths_above(transmission, i.steps) if len(i.steps) > 1 else []
-        drawn, shares = _drawn(transmission, i)
+        drawn, shares = _drawn(transmission, i, widths)
         alone = [_masking(x.roughness, i, j) for j, x in enumerate(transmission.refractions)]
         masked = [_masking(x.roughness, i, j) for j, x in enumerate(drawn)]
         comes = [x * y for x, y in zip(_smooth_above(i), _from_top(i.slabs, operator.mul))]
