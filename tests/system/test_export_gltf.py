@@ -54,13 +54,15 @@ def test_khronos_finds_no_fault(painted: vt.Stack, tmp_path: Path) -> None:
     """Expected: no error and no warning, of files alone, on an object, and on the mesh of another file."""
     if not PACKAGE.is_dir():
         pytest.skip("gltf-validator is missing: npm ci in tests/page")
+    worn = vt.Mix([({"texture": str(tmp_path / "wood 1.png")}, GOLD), (None, painted)])
     made = {
+        "maps": vt.export(worn, "gltf-coat", folder=tmp_path, mesh="sphere", maps=4),
         "alone": vt.export(painted, "gltf", folder=tmp_path),
         "ball": vt.export(painted, "gltf", folder=tmp_path, mesh="sphere"),
         "coat": vt.export(GOLD, "gltf-coat", folder=tmp_path, mesh="lid"),
     }
     paths = [each.save(tmp_path / f"{name}{end}")[0] for name, each in made.items() for end in (".gltf", ".glb")]
-    for mesh in paths[2:4]:
+    for mesh in paths[4:6]:
         for end in (".gltf", ".glb"):
             again = vt.export("bare-gold", "gltf", folder=tmp_path, mesh=mesh)
             paths.append(again.save(tmp_path / f"on {mesh.suffix[1:]}{end}")[0])

@@ -127,8 +127,8 @@ def fitted_once(monkeypatch: pytest.MonkeyPatch) -> None:
     """Parameters and matrices do not depend on names; they are fitted once for a target, or are 0."""
     fit, found = baked.bake, dict[str, Any]()
 
-    def of_any_name(stack: vt.Stack | vt.Mix, target: str, *rest: Any) -> Any:
-        made = found[target] = found.get(target) or fit(stack, target, *rest)
+    def of_any_name(stack: vt.Stack | vt.Mix, target: str, *rest: Any, **options: Any) -> Any:
+        made = found[target] = found.get(target) or fit(stack, target, *rest, **options)
         texture: Any = next((x for x in stack.flat().values() if isinstance(x, Texture)), None)
         images = {name: replace(image, texture=texture) for name, image in made.images.items()}
         return replace(made, name=stack.name, images=images)

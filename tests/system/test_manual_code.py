@@ -55,6 +55,7 @@ ELSEWHERE = {
     "python benchmarks/validation.py": "it takes two minutes; tests/unit/test_validation.py runs a part",
     "velatura benchmark truth": "it takes hours; tests/unit/test_benchmark.py walks through a part",
     "mpiexec": "it needs MPI",
+    "velatura export worn-painted-steel": "it takes ten seconds; tests/system/test_baked_maps.py bakes smaller images",
     "velatura edit --static": "it takes minutes; tests/browser/test_offline.py writes a part",
 }
 # Languages that are not run here, and why

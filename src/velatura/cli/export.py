@@ -15,10 +15,12 @@ from velatura.cli import options
 from velatura.errors import InvalidInput
 from velatura.exports import FORMATS, check_writable, taking
 from velatura.exports import export as exported
+from velatura.progress import bar
 
 To = Enum("To", {name: name for name in FORMATS}, type=str)  # type: ignore[misc]
 _SHADERS = ", ".join(taking("constant"))
 _BOUND = ", ".join(taking("binding"))
+_MAPS = ", ".join(taking("maps"))
 
 
 def export(
@@ -67,6 +69,13 @@ def export(
             help="For gltf: what shows the material, an object of scenes such as sphere, or a file of glTF.",
         ),
     ] = None,
+    maps: Annotated[
+        int | None,
+        typer.Option(
+            metavar="SIZE",
+            help=f"For {_MAPS}: bake textures into images of at most SIZE x SIZE texels, beside the file.",
+        ),
+    ] = None,
     settings: options.Settings = None,
 ) -> None:
     """Write a material as a file of another program."""
@@ -77,7 +86,7 @@ def export(
     if tables is not None:
         files.check_writable(tables, "a file of tables", (".bin",))
     chosen: dict[str, Any] = {"constant": constant or None, "prefix": prefix, "group": group, "binding": binding}
-    chosen |= {"baked": baked or None, "half": half or None, "tables": tables, "mesh": mesh}
+    chosen |= {"baked": baked or None, "half": half or None, "tables": tables, "mesh": mesh, "maps": maps}
     chosen = {name: value for name, value in chosen.items() if value is not None}
     for name in chosen:
         if name not in FORMATS[to.value].options:
@@ -86,7 +95,10 @@ def export(
     folder = output.parent if output else None
     from velatura.stack.paths import beside
 
-    with beside(stack, folder) if folder else contextlib.nullcontext(stack) as placed:
+    with contextlib.ExitStack() as within:
+        placed = within.enter_context(beside(stack, folder)) if folder else stack
+        if maps is not None:
+            chosen["progress"] = within.enter_context(bar("Baking images"))
         made = exported(placed, to.value, options.model_name(model), folder=folder, **chosen, **switches)
         written = made.save(output) if output else []
     for note in made.notes:

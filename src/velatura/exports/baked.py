@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from velatura.errors import InvalidInput
 from velatura.exports.request import Export, Request, relative, stated
+from velatura.model.context import in_silence
 from velatura.programs.fit import TARGETS, bake
 from velatura.programs.program import Bake
 from velatura.shader.closures import Loss
@@ -18,13 +21,30 @@ from velatura.stack import dumps
 def write(request: Request) -> Export:
     """The file of the program that has the format's name."""
     made, program = fitted(request, request.to), TARGETS[request.to]
+    apart: dict[Path, bytes] = {}
+    if made.maps:
+        folder = request.folder or Path()
+        made, apart = _placed(made, folder.resolve() if program.anywhere else folder)
     text = program.text(made, held(request), files(made, None if program.anywhere else request.folder))
-    return Export(text, notes=tuple(made.summary), facts=facts(made))
+    return Export(text, notes=tuple(made.summary), apart=apart, facts=facts(made))
 
 
 def fitted(request: Request, target: str) -> Bake:
     """The material as parameters of a target."""
-    return bake(request.material, target, request.model)
+    maps = request.options.get("maps")
+    if maps is not None and request.folder is None:
+        raise InvalidInput(f"maps: {target} has its images in files beside it; name its folder")
+    return bake(request.material, target, request.model, maps=maps, progress=request.progress or in_silence)
+
+
+def _placed(made: Bake, folder: Path) -> tuple[Bake, dict[Path, bytes]]:
+    """A bake whose images lie in a folder, and what is to be written there."""
+    images, apart = {}, {}
+    for name, image in made.images.items():
+        path = folder / image.texture.texture.name
+        apart[path] = image.texture.texture.read_bytes()
+        images[name] = replace(image, texture=image.texture.model_copy(update={"texture": path}))
+    return replace(made, images=images), apart
 
 
 def held(request: Request) -> Any:

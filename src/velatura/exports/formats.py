@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection
+from collections.abc import Callable, Collection
 from dataclasses import replace
 from importlib import import_module
 from pathlib import Path
@@ -43,6 +43,7 @@ _SHADERS = {
     "wgsl": (".wgsl",),
 }
 _OF_SHADERS = frozenset({"constant", "prefix", "half", "tables", "baked"})
+_MAPS = frozenset({"maps"})  # of parameters
 _BOUND = _OF_SHADERS | {"group", "binding"}  # of languages that say where textures are bound
 
 
@@ -64,10 +65,10 @@ FORMATS: dict[str, Format] = {
     "python": Format((".py",), "velatura.exports.python"),
     "bsdf": Format((".bsdf",), "velatura.exports.bsdf", is_text=False),
     "bsdf-xml": Format((".xml",), "velatura.exports.klems"),
-    **{name: Format(baked.endings, "velatura.exports.baked") for name, baked in BAKED.items()},
+    **{name: Format(baked.endings, "velatura.exports.baked", options=_MAPS) for name, baked in BAKED.items()},
     "usd": Format(BAKED["usd"].endings, "velatura.exports.usd"),
     **{
-        name: Format(BAKED[name].endings, "velatura.exports.gltf", options=frozenset({"mesh"}))
+        name: Format(BAKED[name].endings, "velatura.exports.gltf", options=_MAPS | {"mesh"})
         for name in ("gltf", "gltf-coat")
     },
 }
@@ -86,7 +87,9 @@ def export(
     half: bool = False,
     tables: str | Path | None = None,
     mesh: str | Path | None = None,
+    maps: int | None = None,
     folder: str | Path | None = None,
+    progress: Callable[[int, int], None] | None = None,
     **switches: Any,
 ) -> Export:
     """A material for other programs.
@@ -111,7 +114,10 @@ def export(
         tables: for shaders, a file of all tables, which shaders of any materials share, in place of one for each.
         mesh: for glTF, what shows the material: an object of scenes ("sphere", "ball"), or a file of glTF, all of whose
             meshes take the material. None by default: the file holds the material alone.
+        maps: for parameters, the greatest size in texels of images that they are baked into, where textures change
+            them; the images are written into the folder. None by default: means of textures are baked.
         folder: where the text will lie, so that a scene may name its textures relative to it.
+        progress: called with stacks fitted and their total, at most, while images are baked.
 
     Raises:
         InvalidInput: not a valid material, an unknown format, model, switch or value, or a material that the format
@@ -124,13 +130,13 @@ def export(
     if to not in FORMATS:
         raise InvalidInput(unknown("format", to, FORMATS))
     asked: dict[str, Any] = {"constant": constant or None, "prefix": prefix, "group": group, "binding": binding}
-    asked |= {"baked": baked or None, "half": half or None, "tables": tables, "mesh": mesh}
+    asked |= {"baked": baked or None, "half": half or None, "tables": tables, "mesh": mesh, "maps": maps}
     options = {name: value for name, value in asked.items() if value is not None}
     for name in options:
         if name not in FORMATS[to].options:
             raise InvalidInput(f"{name}: only for {', '.join(taking(name))}, not for {to}")
     chosen = named(DEFAULT if model is None else model, **switches)
-    request = Request(to, load(material), chosen, switches, None if folder is None else Path(folder), options)
+    request = Request(to, load(material), chosen, switches, None if folder is None else Path(folder), options, progress)
     written: Export = import_module(FORMATS[to].module).write(request)
     if not FORMATS[to].has_facts:
         return written

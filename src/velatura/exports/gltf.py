@@ -49,7 +49,8 @@ def write(request: Request) -> Export:
     document = {**document, **scene, "asset": asset, "extensionsUsed": extensions}
     document = {key: value for key, value in document.items() if value not in ([], {})}
     text = _json(_with_buffer(document, buffer, inline=True), indent=2) + "\n"
-    return replace(made, text=text, binary={".glb": partial(_packed, document, buffer, request.folder or Path())})
+    packed = partial(_packed, document, buffer, request.folder or Path(), made.apart)
+    return replace(made, text=text, binary={".glb": packed})
 
 
 # Scenes --------------------------------------------------------------------------------------------------------------
@@ -179,13 +180,13 @@ def _json(document: Mapping[str, Any], indent: int | None = None) -> str:
     return json.dumps(document, indent=indent, ensure_ascii=False, allow_nan=False)
 
 
-def _packed(document: Mapping[str, Any], buffer: bytearray, folder: Path) -> bytes:
-    """A .glb: the document, and a chunk with the buffer and the images."""
+def _packed(document: Mapping[str, Any], buffer: bytearray, folder: Path, baked_images: Mapping[Path, bytes]) -> bytes:
+    """A .glb: the document, and a chunk with the buffer and the images, of which some are in no file."""
     buffer, views, inside = bytearray(buffer), list(document.get("bufferViews", ())), []
     for image in document.get("images", ()):
         path = folder / unquote(image["uri"])
         kind = "image/png" if path.suffix.lower() == ".png" else "image/jpeg"
         inside.append({"name": path.stem, "bufferView": len(views), "mimeType": kind})
-        views.append(_view(buffer, files.content(path)))
+        views.append(_view(buffer, baked_images[path] if path in baked_images else files.content(path)))
     document = {**document, **({"images": inside, "bufferViews": views} if inside else {})}
     return file.packed(_json(_with_buffer(document, buffer)).encode(), bytes(buffer))

@@ -27,7 +27,8 @@ LICENCE = "BSD-3-Clause"  # of code that is written
 class Request:
     """A request for an export: a format, a material, the model with its changed switches, and the format's options.
 
-    Paths of textures are relative to `folder`, where the format allows that; absolute without one.
+    Paths of textures are relative to `folder`, where the format allows that; absolute without one. `progress` is called
+    with steps done and their total, by formats that take long.
     """
 
     to: str
@@ -36,6 +37,7 @@ class Request:
     switches: Mapping[str, str]
     folder: Path | None
     options: Mapping[str, Any]
+    progress: Callable[[int, int], None] | None = None
 
     @property
     def constants(self) -> Collection[str]:
@@ -83,10 +85,10 @@ class Export(Fields):
     """A text, and the files that belong beside it, by ending: `.tables.bin` is `gold.tables.bin` beside `gold.glsl`.
 
     data: the file itself in a format that is no text, which then is empty.
-    binary: by another ending of the format, what makes the file that has it and is no text.
+    binary: by another ending of the format, what makes the file that has it and is no text; all is in it.
     costs: of code, what a call of each function costs, in words; notes: of parameters, what is lost, in
     sentences; of code, shared tables that it does not read.
-    apart: files that several exports share, by path.
+    apart: files that several exports share, and baked images, by path.
     facts: what a program needs to know to use the file, as JSON: `gold.glsl.json` beside `gold.glsl`; none if empty.
     textures: those of the code that lie in files, for the facts.
     """
@@ -108,7 +110,8 @@ class Export(Fields):
             InvalidInput: a file cannot be written; an existing file stays.
         """
         path = Path(path)
-        others = {**{path.with_suffix(ending): data for ending, data in self.beside.items()}, **self.apart}
+        others = {path.with_suffix(ending): data for ending, data in self.beside.items()}
+        others |= {} if path.suffix.lower() in self.binary else self.apart
         others |= {facts_beside(path): self.described(path).encode()} if self.facts else {}
         for other, data in others.items():
             with files.whole(other) as unfinished:

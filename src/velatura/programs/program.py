@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import dataclass
+from collections.abc import Callable, Container, Mapping
+from dataclasses import dataclass, field
 from typing import Any, TypeAlias
 
 import numpy as np
@@ -29,6 +29,7 @@ class Program:
     turned, pane: whether brushing can be turned, and light pass without refraction.
     colour, roughness: the parameter that takes an image of a diffuse base's colour, where `metal` is less than .5, and
         of the root of the one interface's alpha; none if empty.
+    maps: the parameters that take baked images, each with the image that it is in, and the channel there.
     images: endings of the files that it reads, which are then in sRGB; any where there are none.
     text: the text of a file, by the bake, the stack in JSON, and names of image files by parameter; these names are
         absolute if it may lie `anywhere`.
@@ -47,6 +48,7 @@ class Program:
     pane: bool = False
     colour: str = ""
     roughness: str = ""
+    maps: Mapping[str, tuple[str, str]] = field(default_factory=dict)
     images: tuple[str, ...] = ()
     anywhere: bool = False
 
@@ -62,14 +64,16 @@ class Program:
 
 @dataclass(frozen=True)
 class Carried:
-    """An image in place of a parameter: a factor times its linear texels, colours or roots of a channel."""
+    """An image in place of a parameter: a factor times its linear texels, colours or one channel, or the `root` of
+    that."""
 
     texture: Texture
     factor: float | RGB
+    root: bool = False
 
     @property
     def channel(self) -> int:
-        """The number of the channel of roots."""
+        """The number of the channel."""
         return "rgba".index(self.texture.channel or "r")
 
 
@@ -80,7 +84,8 @@ class Bake(Fields):
     For the N cosines of incidence `cos_theta`, in the target's own formulas against the model: total_variation (N,),
     the share of the reflected light in wrong places, as `compare` measures it; albedo, baked_albedo (3, N); passed,
     baked_passed (3, N), what leaves below. lost: what the program does not hold. images: in place of numbers, by
-    parameter. thin: light passes without refraction.
+    parameter. thin: light passes without refraction. maps: how images were baked, in sentences; the loss then is the
+    mean over the surface.
     """
 
     target: str
@@ -97,6 +102,7 @@ class Bake(Fields):
     lost: tuple[str, ...]
     images: dict[str, Carried]
     thin: bool
+    maps: tuple[str, ...] = ()
 
     def differing(self, parameters: tuple[Input, ...]) -> list[tuple[Input, float | RGB]]:
         """Parameters that differ from their defaults."""
@@ -123,7 +129,7 @@ class Bake(Fields):
         ]
         if self.passed.any():
             lines.append(f"light that passes: {_off(self.passed, self.baked_passed, self.cos_theta)}")
-        return lines + [f"not held: {each}" for each in self.lost]
+        return [*lines, *self.maps, *(f"not held: {each}" for each in self.lost)]
 
 
 def _off(true: Array, found: Array, cosines: tuple[float, ...]) -> str:
@@ -132,6 +138,12 @@ def _off(true: Array, found: Array, cosines: tuple[float, ...]) -> str:
     channel, n = np.unravel_index(np.argmax(np.abs(error)), error.shape)
     where = f"{('red', 'green', 'blue')[channel]}, cosine {cosines[n]:g}"
     return f"{np.abs(error).mean():.3f} off in the mean, {error[channel, n]:+.3f} at most ({where})"
+
+
+def own_maps(parameters: tuple[Input, ...], without: Container[str] = ()) -> dict[str, tuple[str, str]]:
+    """Maps of a program whose parameters have an image each, `without` some that take none."""
+    names = [each for each in parameters if each.name not in without]
+    return {each.name: (each.name, "rgb" if each.is_colour else "r") for each in names}
 
 
 # Parameters of surfaces -----------------------------------------------------------------------------------------------

@@ -9,8 +9,10 @@ import numpy as np
 
 from velatura.programs.parameters import RGB, Values
 from velatura.programs.program import Carried, Program
-from velatura.programs.values import texels
+from velatura.programs.values import Array, texels
 from velatura.stack import Address, Brushing, Described, Stack, Texture, Varying
+
+FIELD = "the field is replaced by its offset"
 
 Means: TypeAlias = dict[str, "float | RGB"]
 
@@ -29,12 +31,21 @@ def _mean(address: Address, value: Varying) -> float | RGB:
     if isinstance(value, Brushing):
         return value.offset
     assert isinstance(value, Texture)
-    colour = address.colour and value.channel in (None, "rgb")
-    mean = np.clip(texels(value, colour, address.name), *address.declared.within).mean(axis=(0, 1))
+    mean = within(address, value).mean(axis=(0, 1))
     if len(mean) == 1:
         return float(mean[0])
     r, g, b = (float(x) for x in mean)
     return r, g, b
+
+
+def within(address: Address, image: Texture) -> Array:
+    """Texels (height, width, 1 or 3) of an image, within the range of the value that it stands for.
+
+    Raises:
+        InvalidInput: it cannot be read. MissingTool: LLVM is missing or too old.
+    """
+    colour = address.colour and image.channel in (None, "rgb")
+    return np.clip(texels(image, colour, address.name), *address.declared.within)
 
 
 def carried(stack: Described, found: Means, program: Program, values: Values) -> Iterator[tuple[str, Carried | str]]:
@@ -47,11 +58,7 @@ def carried(stack: Described, found: Means, program: Program, values: Values) ->
         taken = None
         if isinstance(stack, Stack) and isinstance(value, Texture):
             taken = _taken(stack, address, value, found, program, values)
-        stands = (
-            "the field is replaced by its offset"
-            if isinstance(value, Brushing)
-            else "the image is replaced by its mean"
-        )
+        stands = FIELD if isinstance(value, Brushing) else "the image is replaced by its mean"
         yield taken or (address.name.removesuffix("_u") if address.key == "alpha_u" else address.name, stands)
 
 
@@ -73,5 +80,5 @@ def _taken(
     isotropic = address.key == "alpha_u" and flat[address.name[:-1] + "v"] == image
     if program.roughness and len(stack.interfaces) == 1 and isotropic:
         root = float(np.sqrt(image.scale / mean) * values[program.roughness])
-        return program.roughness, Carried(image, float(f"{root:.6g}"))
+        return program.roughness, Carried(image, float(f"{root:.6g}"), root=True)
     return None

@@ -9,7 +9,7 @@ import numpy as np
 from velatura.errors import remark
 from velatura.programs.blender import formulas
 from velatura.programs.blender.parameters import PARAMETERS
-from velatura.programs.program import Bake, Carried, Fitted, Program, burley, mean_alpha, product, rgb
+from velatura.programs.program import Bake, Carried, Fitted, Program, burley, mean_alpha, own_maps, product, rgb
 from velatura.programs.program import roughness as rough
 from velatura.programs.surface import Surface
 
@@ -71,18 +71,21 @@ material.node_tree.links.new(tangent.outputs["Tangent"], node.inputs["Tangent"])
 
 _IMAGE = """
 
-def multiplied(name, path, space, factor, channel=None):
+def multiplied(name, path, space, factor, channel=None, root=False):
     nodes, links = material.node_tree.nodes, material.node_tree.links
     image = nodes.new("ShaderNodeTexImage")
     image.image = bpy.data.images.load(path)
     image.image.colorspace_settings.name = space
     product, source = nodes.new("ShaderNodeVectorMath"), image.outputs["Color"]
-    if channel is not None:  # roughness is the root of the image's channel
-        parts, root = nodes.new("ShaderNodeSeparateColor"), nodes.new("ShaderNodeMath")
-        root.operation = "SQRT"
+    if channel is not None:
+        parts = nodes.new("ShaderNodeSeparateColor")
         links.new(source, parts.inputs[0])
-        links.new(image.outputs["Alpha"] if channel == 3 else parts.outputs[channel], root.inputs[0])
-        source = root.outputs[0]
+        source = image.outputs["Alpha"] if channel == 3 else parts.outputs[channel]
+    if root:  # roughness is the root of the image's channel
+        power = nodes.new("ShaderNodeMath")
+        power.operation = "SQRT"
+        links.new(source, power.inputs[0])
+        source = power.outputs[0]
     product.operation = "MULTIPLY"
     product.inputs[1].default_value = factor
     links.new(source, product.inputs[0])
@@ -96,7 +99,7 @@ def _read(image: Carried) -> str:
     space = "sRGB" if image.texture.encoding == "srgb" else "Non-Color"
     if isinstance(image.factor, tuple):
         return f"{space!r}, {image.factor!r}"
-    return f"{space!r}, {(image.factor,) * 3!r}, {image.channel}"
+    return f"{space!r}, {(image.factor,) * 3!r}, {image.channel}{', root=True' * image.root}"
 
 
 PROGRAM = Program(
@@ -111,5 +114,6 @@ PROGRAM = Program(
     turned=True,
     colour="Base Color",
     roughness="Roughness",
+    maps=own_maps(PARAMETERS, ("Anisotropic Rotation",)),
     anywhere=True,
 )

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import re
 import struct
 from collections.abc import Callable, Mapping
 from pathlib import Path
@@ -17,7 +16,7 @@ from velatura.programs import embedded
 from velatura.programs.given import is_number
 from velatura.programs.gltf import read as gltf
 from velatura.programs.gltf.images import Images
-from velatura.programs.gltf.parameters import ANISOTROPY, CHANNELS, CLEARCOAT, COAT, CORE
+from velatura.programs.gltf.parameters import ANISOTROPY, CHANNELS, CLEARCOAT, COAT, CORE, image_of
 from velatura.programs.imported import Imported, Left, Notes, shown
 from velatura.programs.surface import INDICES
 from velatura.programs.values import Value, changed
@@ -107,8 +106,7 @@ def of_material(
 
     # Images, times their factors
     for factor in gltf.PARAMETERS:
-        key = re.sub("(metallic|roughness)Factor", "metallicRoughnessTexture", factor.name)
-        key = re.sub("Factor|Maximum", "Texture", key)
+        key = image_of(factor.name)
         reference = parts.get(factor.within, {}).get(key) if factor.name in CHANNELS else None
         if reference is None:
             continue

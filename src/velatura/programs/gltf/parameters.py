@@ -1,5 +1,6 @@
 """Parameters of materials of glTF 2.0 and its extensions (https://registry.khronos.org/glTF)."""
 
+import re
 from math import pi
 
 from velatura.programs.parameters import GREATEST, ROUGH, UNIT, Input
@@ -46,6 +47,13 @@ COATING = (
     Input("coatAnisotropyStrength", 0.0, within=COAT, fit=("brushed", *UNIT)),
     Input("coatAnisotropyRotation", 0.0, -GREATEST, GREATEST, COAT),  # anticlockwise
 )
+
+
+def image_of(factor: str) -> str:
+    """The name of the image that stands in place of a factor."""
+    key = re.sub("(metallic|roughness)Factor", "metallicRoughnessTexture", factor)
+    return re.sub("Factor|Maximum", "Texture", key)
+
 
 #: Channels of images that stand in place of factors.
 CHANNELS = {

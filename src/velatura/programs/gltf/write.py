@@ -11,7 +11,16 @@ import numpy as np
 from velatura.optics import fresnel
 from velatura.programs import embedded
 from velatura.programs.gltf import formulas
-from velatura.programs.gltf.parameters import CLEARCOAT, COAT, COATING, CORE, PARAMETERS, VOLUME
+from velatura.programs.gltf.parameters import (
+    CHANNELS,
+    CLEARCOAT,
+    COAT,
+    COATING,
+    CORE,
+    PARAMETERS,
+    VOLUME,
+    image_of,
+)
 from velatura.programs.program import Bake, Fitted, Program, mean_alpha, product, rgb, roughness
 from velatura.programs.surface import Alpha, Surface
 from velatura.version import __version__
@@ -61,14 +70,18 @@ def text(made: Bake, material: Any, files: dict[str, str]) -> str:
     """A document without geometry, with the loss and the stack in `extras` of its material."""
     written: dict[str, Any] = {"name": made.name or "material"}
     extensions: dict[str, dict[str, Any]] = {}
-    known = tuple(each for each in (*PARAMETERS, *COATING) if each.name in made.values)
-    for parameter, value in made.differing(known):
-        part = written if parameter.within == CORE else extensions
-        number = [*value, 1.0] if parameter.name == "baseColorFactor" and isinstance(value, tuple) else value
-        part.setdefault(parameter.within, {})[parameter.name] = number
-    for name, image in made.images.items():  # of the base's colour alone
-        core = written.setdefault(CORE, {})
-        core |= {name: [*rgb(image.factor), 1.0], "baseColorTexture": {"index": 0}}
+    named = list(dict.fromkeys(files.values()))  # several factors may have one image
+    for parameter in (*PARAMETERS, *COATING):
+        name, image = parameter.name, made.images.get(parameter.name)
+        value = image.factor if image else made.values.get(name, parameter.default)
+        if value == parameter.default and not image:
+            continue
+        part = (written if parameter.within == CORE else extensions).setdefault(parameter.within, {})
+        part[name] = [*value, 1.0] if name == "baseColorFactor" and isinstance(value, tuple) else value
+        if image:
+            part[image_of(name)] = {"index": named.index(files[name])}
+        if image and name == "iridescenceThicknessMaximum":
+            part["iridescenceThicknessMinimum"] = 0.0
     if COAT in extensions:  # for programs that know none but a clearcoat
         share, eta, rough, strength = (made.values[name] for name in COATED)
         alpha = mean_alpha(formulas.alphas(rough, strength))  # type: ignore[arg-type]
@@ -88,9 +101,9 @@ def text(made: Bake, material: Any, files: dict[str, str]) -> str:
     document: dict[str, Any] = {"asset": {"version": "2.0", "generator": f"Velatura {__version__}"}}
     if extensions:
         document["extensionsUsed"] = list(extensions)
-    if files:
-        document["images"] = [{"uri": quote(file)} for file in files.values()]
-        document["textures"] = [{"source": 0}]
+    if named:
+        document["images"] = [{"uri": quote(file)} for file in named]
+        document["textures"] = [{"source": n} for n in range(len(named))]
     document["materials"] = [written]
     return json.dumps(document, indent=2, ensure_ascii=False, allow_nan=False) + "\n"
 
@@ -104,5 +117,6 @@ PROGRAM = Program(
     turned=True,
     pane=True,
     colour="baseColorFactor",
+    maps={name: (image_of(name), channel) for name, channel in CHANNELS.items()},
     images=(".png", ".jpg", ".jpeg"),
 )

@@ -11,7 +11,7 @@ import numpy as np
 from velatura.programs import embedded, xml
 from velatura.programs.openpbr import formulas
 from velatura.programs.openpbr.parameters import PARAMETERS, TURNS
-from velatura.programs.program import Bake, Carried, Fitted, Program, rgb, roughness
+from velatura.programs.program import Bake, Carried, Fitted, Program, own_maps, rgb, roughness
 from velatura.programs.surface import Surface
 
 
@@ -91,7 +91,7 @@ def text(made: Bake, material: Any, files: dict[str, str]) -> str:
 
 
 def _image(name: str, image: Carried, file: str) -> Iterator[str]:
-    """Nodes that read an image, take the root of a channel where it is none of colours, and scale it."""
+    """Nodes that read an image, take a channel, or its root, where it is none of colours, and scale it."""
     space = "srgb_texture" if image.texture.encoding == "srgb" else ""
     kind, read = _kind(image.factor), "color3" if image.channel < 3 else "color4"
     source = f"{name}_image"
@@ -99,8 +99,10 @@ def _image(name: str, image: Carried, file: str) -> Iterator[str]:
     if kind == "float":
         index = _input("index", "integer", str(image.channel))
         yield _node("extract", f"{name}_channel", "float", _input("in", read, node=source), index)
-        source = f"{name}_root"
-        yield _node("sqrt", source, "float", _input("in", "float", node=f"{name}_channel"))
+        source = f"{name}_channel"
+        if image.root:
+            yield _node("sqrt", f"{name}_root", "float", _input("in", "float", node=source))
+            source = f"{name}_root"
     factor = _input("in2", kind, xml.numbers(image.factor))
     yield _node("multiply", name, kind, _input("in1", kind, node=source), factor)
 
@@ -131,4 +133,5 @@ PROGRAM = Program(
     pane=True,
     colour="base_color",
     roughness="specular_roughness",
+    maps=own_maps(PARAMETERS),
 )

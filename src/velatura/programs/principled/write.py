@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from typing import Any
+from xml.sax.saxutils import quoteattr
 
 import numpy as np
 
@@ -10,7 +12,7 @@ from velatura.optics import fresnel
 from velatura.programs import embedded, xml
 from velatura.programs.principled import formulas
 from velatura.programs.principled.parameters import PARAMETERS
-from velatura.programs.program import Bake, Fitted, Program, burley, mean_alpha, product
+from velatura.programs.program import Bake, Carried, Fitted, Program, burley, mean_alpha, own_maps, product
 from velatura.programs.surface import Surface
 
 
@@ -41,9 +43,20 @@ def text(made: Bake, material: Any, files: dict[str, str]) -> str:
     values = [
         f'        <{"rgb" if each.is_colour else "float"} name="{each.name}" value="{xml.numbers(value)}"/>'
         for each, value in made.differing(PARAMETERS)
+        if each.name not in made.images
     ]
-    body = ['    <bsdf type="principled" id="material">', *values, "    </bsdf>", "</scene>", ""]
+    images = [line for name, image in made.images.items() for line in _image(name, image, files[name])]
+    body = ['    <bsdf type="principled" id="material">', *values, *images, "    </bsdf>", "</scene>", ""]
     return embedded.document(['<scene version="3.0.0">'], made.comment, material, body)
+
+
+def _image(name: str, image: Carried, file: str) -> Iterator[str]:
+    """A texture of an image that the plugin takes as it is."""
+    yield f'        <texture type="bitmap" name="{name}">'
+    yield f'            <string name="filename" value={quoteattr(file)}/>'
+    if image.texture.encoding == "linear":
+        yield '            <boolean name="raw" value="true"/>'
+    yield "        </texture>"
 
 
 PROGRAM = Program(
@@ -52,4 +65,5 @@ PROGRAM = Program(
     formulas.value,
     start,
     text,
+    maps=own_maps(PARAMETERS, ("eta",)),
 )
