@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import functools
+import shutil
 import sys
 from collections.abc import Callable
 from pathlib import Path
@@ -79,6 +80,35 @@ def test_layers_are_valid(painted: vt.Stack, tmp_path: Path) -> None:
             for each in shader.GetInputs():
                 assert definition.getActiveInput(each.GetBaseName()), (name, each.GetBaseName())
             assert [each.getName() for each in definition.getActiveOutputs()] == ["out"]
+
+
+def test_a_package_has_its_images_inside(painted: vt.Stack, tmp_path: Path) -> None:
+    """Expected: the layer's surfaces, whose images are read out of the package where nothing else is left."""
+    from pxr import Ar
+
+    package = saved(painted, tmp_path, name="a.usdz")
+    moved = tmp_path / "elsewhere" / "b.usdz"
+    moved.parent.mkdir()
+    shutil.move(package, moved)
+    wood = tmp_path / "wood @@@ 1.png"
+    data = wood.read_bytes()
+    wood.unlink()
+    stage = Usd.Stage.Open(str(moved))
+    material = UsdShade.Material(stage.GetDefaultPrim())
+    assert material.ComputeSurfaceSource("")[0].GetIdAttr().Get() == "UsdPreviewSurface"
+    images = [
+        each.Get().resolvedPath
+        for prim in stage.Traverse()
+        for each in prim.GetAttributes()
+        if each.GetTypeName() == Sdf.ValueTypeNames.Asset
+    ]
+    assert len(images) == 3  # albedo twice, and roughness
+    for path in images:
+        assert path.startswith(f"{moved}[")
+        assert bytes(Ar.GetResolver().OpenAsset(Ar.ResolvedPath(path)).GetBuffer()) == data
+    checker = UsdValidation.ValidationContext(UsdValidation.ValidationRegistry().GetOrLoadAllValidators())
+    for fault in checker.Validate(stage):
+        assert fault.GetName() == "MissingShaderIdInRegistry" and "'ND_" in fault.GetMessage(), fault.GetMessage()
 
 
 def test_a_stack_comes_back(painted: vt.Stack, tmp_path: Path) -> None:

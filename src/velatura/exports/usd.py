@@ -1,13 +1,19 @@
-"""A material of USD: OpenPBR as a network of MaterialX, and UsdPreviewSurface for what does not read that."""
+"""A material of USD: OpenPBR as a network of MaterialX, and UsdPreviewSurface for what does not read that; as a .usdz
+with its images inside."""
 
 from __future__ import annotations
 
+import tempfile
 from collections.abc import Iterator
+from functools import partial
+from pathlib import Path
 from xml.etree import ElementTree
 
+from velatura.errors import InvalidInput, needs
 from velatura.exports import baked
 from velatura.exports.request import Export, Request
 from velatura.programs.fit import TARGETS
+from velatura.programs.program import Bake
 from velatura.programs.usd import write as usd
 from velatura.programs.usd.write import ROOT, Shader, quoted
 
@@ -28,16 +34,38 @@ TYPES = {
 def write(request: Request) -> Export:
     """The layer, with the loss of both surfaces."""
     shown, plain = (baked.fitted(request, target) for target in ("openpbr", request.to))
+    text = _layer(request, shown, plain, request.folder)
+    apart = partial(_packed, _layer(request, shown, plain, None))  # names its images wherever it lies
+    facts = {**baked.facts(shown), "preview": baked.facts(plain)}
+    return Export(text, notes=(*shown.summary, *plain.summary), binary={".usdz": apart}, facts=facts)
+
+
+def _layer(request: Request, shown: Bake, plain: Bake, folder: Path | None) -> str:
+    """The text of the layer, which names images relative to a folder, if there is one."""
     material = baked.held(request)
-    graph = TARGETS["openpbr"].text(shown, material, baked.files(shown, request.folder))
-    shaders = [*_shaders(graph), *usd.preview(plain, baked.files(plain, request.folder))]
+    graph = TARGETS["openpbr"].text(shown, material, baked.files(shown, folder))
+    shaders = [*_shaders(graph), *usd.preview(plain, baked.files(plain, folder))]
     outputs = [
         f"mtlx:surface.connect = <{ROOT}/surface.outputs:out>",
         f"surface.connect = <{ROOT}/preview.outputs:surface>",
     ]
-    text = usd.document(shown.name, [*shown.comment, "", *plain.summary], material, shaders, outputs)
-    facts = {**baked.facts(shown), "preview": baked.facts(plain)}
-    return Export(text, notes=(*shown.summary, *plain.summary), facts=facts)
+    return usd.document(shown.name, [*shown.comment, "", *plain.summary], material, shaders, outputs)
+
+
+def _packed(text: str) -> bytes:
+    """A package of OpenUSD of the layer and its images.
+
+    Raises:
+        InvalidInput: an image cannot be read. MissingTool: usd-core is not installed.
+    """
+    with needs("usd"):
+        from pxr import Sdf, UsdUtils
+    with tempfile.TemporaryDirectory(prefix="velatura-") as folder:
+        layer, package = Path(folder, "material.usda"), Path(folder, "material.usdz")
+        layer.write_text(text, encoding="utf-8")
+        if not UsdUtils.CreateNewUsdzPackage(Sdf.AssetPath(str(layer)), str(package)):
+            raise InvalidInput("usd: OpenUSD cannot pack the layer with its images into a .usdz")
+        return package.read_bytes()
 
 
 def _shaders(graph: str) -> Iterator[Shader]:

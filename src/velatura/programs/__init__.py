@@ -26,7 +26,7 @@ BAKED = {
     "openpbr": Baked("velatura.programs.openpbr.write", (".mtlx",)),
     "gltf": Baked("velatura.programs.gltf.write", (".gltf", ".glb")),
     "gltf-coat": Baked("velatura.programs.gltf.coated", (".gltf", ".glb")),
-    "usd": Baked("velatura.programs.usd.write", (".usda",)),
+    "usd": Baked("velatura.programs.usd.write", (".usda", ".usdz")),
     "blender-principled": Baked("velatura.programs.blender.write", (".py",)),
     "mitsuba-principled": Baked("velatura.programs.principled.write", (".xml",)),
 }
