@@ -95,7 +95,7 @@ class Binding(Values):
                 spans.append(Span(address, found.low, found.high))
         number = mi.Float if dr.is_jit_v(mi.Float) else None
         some = {**dict.fromkeys(self.images, 0.0), **self._colours()}
-        return constant_films(Material.from_flat(self.stack, some, self._light), spans, number)
+        return constant_films(Material.from_flat(self.stack, some, self._light), spans, number, mi.is_polarized)
 
     def _metals(self) -> Sequence[MeasuredIndex | None]:
         """The measured index of each layer, while its colours are as they were at first, and not differentiated."""

@@ -4,12 +4,16 @@ from __future__ import annotations
 
 import functools
 from math import pi
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from velatura import ops
-from velatura.films.tables import NODES, ColourTable
+from velatura.films.of_material import SENSITIVITIES
+from velatura.films.reflectance import InterfaceFilms
+from velatura.films.spectral import AtWavelengths
+from velatura.films.tables import NODES, Coated, ColourTable
 from velatura.ops import Value
 from velatura.optics.coatings import Coating, Sensitivity
 from velatura.optics.polarisation import Mueller
@@ -50,6 +54,32 @@ class PolarisedFilms:
         return reflection, Mueller(*found[8:])
 
 
+def matrices(
+    films: InterfaceFilms, light: Any, above: Value, cosine: Value, cos_t: Value, eta: Value, like: Value
+) -> tuple[Mueller, Mueller]:
+    """Matrices of light that an interface reflects and transmits, as `InterfaceFilms.shares`; eta is the index beyond
+    over that here, and `light` that of the material."""
+    if isinstance(films, AtWavelengths):
+        return films.matrices(above, cosine, cos_t)
+    assert isinstance(films, Coated)
+    return _tabulated(films, light).dielectric(films.from_rarer(above), cosine, cos_t, eta, like)
+
+
+def opaque_matrix(films: InterfaceFilms, light: Any, cosine: Value, like: Value) -> Mueller:
+    """Matrix of light that an opaque interface reflects."""
+    return films.matrix(cosine) if isinstance(films, AtWavelengths) else _tabulated(films, light).opaque(cosine, like)
+
+
+def polarise(films: InterfaceFilms) -> bool:
+    """Whether matrices of films are known: not where a table is over a thickness."""
+    return isinstance(films, AtWavelengths) or (isinstance(films, Coated) and films.coating is not None)
+
+
+def _tabulated(films: InterfaceFilms, light: Any) -> PolarisedFilms:
+    assert isinstance(films, Coated) and films.coating
+    return polarised_films(films.coating, films.n12 is None, SENSITIVITIES[light])
+
+
 @functools.lru_cache(16)
 def polarised_films(coating: Coating, opaque: bool, sensitivity: Sensitivity) -> PolarisedFilms:
     """Matrices of films between a medium of the lower index, above, and one of the higher, or an opaque one."""
@@ -58,14 +88,7 @@ def polarised_films(coating: Coating, opaque: bool, sensitivity: Sensitivity) ->
     def matrix(of: Coating, name: str, cos: Array, most: Array | float = 1.0) -> list[Array]:
         """Numbers of a matrix, of shares up to `most` in the mean of s and p."""
         names = [f"{name}_{part}" for part in ("s", "p", "real", "imaginary")]
-        s, p, real, imaginary = of.shares(names, cos, sensitivity)
-        # Colours outside sRGB are clipped as those of unpolarised light are
-        both = 2 * np.clip(0.5 * (s + p), 0, most)
-        s = np.clip(s, np.maximum(both - 1, 0), np.minimum(both, 1))
-        p = both - s
-        # Sensitivities that are negative leave no matrix that light cannot have
-        bound = np.minimum(np.sqrt(s * p) / np.maximum(np.hypot(real, imaginary), 1e-9), 1)
-        return [s, p, bound * real, bound * imaginary]
+        return [*vars(Mueller(*of.shares(names, cos, sensitivity)).bounded(most)).values()]
 
     reflected = matrix(coating, "reflected", cosines)
     if opaque:

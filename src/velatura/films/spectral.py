@@ -6,7 +6,7 @@ import functools
 import sys
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -16,8 +16,12 @@ from velatura.films.tables import MATCHED
 from velatura.ops import Value
 from velatura.optics.coatings import Sensitivity, quadrature
 from velatura.optics.films import OpticalFilm, Response, coherent
+from velatura.optics.polarisation import Mueller
 from velatura.renderer.packets import aligned
 from velatura.stack import FilmValues, InterfaceValues
+
+if TYPE_CHECKING:
+    from typing_extensions import Self
 
 
 @dataclass(frozen=True)
@@ -48,14 +52,33 @@ class AtWavelengths(InterfaceFilms):
         return self._shares(cos_1, cos_2)[1]
 
     def shares(self, above: Value, cosine: Value, cos_t: Value, like: Value) -> tuple[Value, Value]:
+        return self._seen_from(above)._shares(cosine, cos_t)
+
+    def matrices(self, above: Value, cosine: Value, cos_t: Value) -> tuple[Mueller, Mueller]:
+        """`shares` of polarised light, as matrices."""
+        return self._seen_from(above)._matrices(cosine, cos_t)
+
+    def matrix(self, cosine: Value) -> Mueller:
+        """Matrix of light that an opaque interface reflects."""
+        return self._matrix("reflected", self._response(cosine))
+
+    def _seen_from(self, above: Value) -> Self:
         seen = self.eta_1, self.films, self.eta_2
         eta_1, films, eta_2 = ops.select_record(above, seen, (self.eta_2, self.films[::-1], self.eta_1))
-        return replace(self, eta_1=eta_1, films=films, eta_2=eta_2)._shares(cosine, cos_t)
+        return replace(self, eta_1=eta_1, films=films, eta_2=eta_2)
 
     def _shares(self, cos_1: Value, cos_2: Value) -> tuple[Value, Value]:
         found = self._response(self._cosine(cos_1, cos_2))
         passes = (cos_1 > 0) & (cos_2 > 0)
         return self._colour(found.reflected), self._colour(ops.select(passes, found.transmitted, 0.0))
+
+    def _matrices(self, cos_1: Value, cos_2: Value) -> tuple[Mueller, Mueller]:
+        found = self._response(self._cosine(cos_1, cos_2))
+        passes = ops.select((cos_1 > 0) & (cos_2 > 0), 1.0, 0.0)
+        return self._matrix("reflected", found), self._matrix("transmitted", found).times_share(passes)
+
+    def _matrix(self, name: str, found: Response) -> Mueller:
+        return Mueller(*(self._colour(getattr(found, f"{name}_{part}")) for part in ("s", "p", "real", "imaginary")))
 
     def at(self, cosine: Value, like: Value) -> Value:
         return self._colour(self._response(cosine).reflected)
@@ -101,16 +124,29 @@ class AtAPoint(AtWavelengths):
         reflected, passing, back = self._summed(both, 3)
         return reflected, ops.minimum(passing, 1 - ops.maximum(reflected, back))
 
+    def _matrices(self, cos_1: Value, cos_2: Value) -> tuple[Mueller, Mueller]:
+        def each(seen: AtWavelengths) -> Sequence[Value]:
+            return [x for matrix in seen._matrices(cos_1, cos_2) for x in vars(matrix).values()]
+
+        found = self._colours(each, 8)
+        reflection = Mueller(*found[:4]).bounded()
+        return reflection, Mueller(*found[4:]).bounded(1 - 0.5 * (reflection.s + reflection.p))
+
+    def matrix(self, cosine: Value) -> Mueller:
+        return Mueller(*self._colours(lambda seen: [*vars(seen.matrix(cosine)).values()], 4)).bounded()
+
     def at(self, cosine: Value, like: Value) -> Value:
         return self._summed(lambda seen: [seen.at(cosine, like)], 1)[0]
 
     def _summed(self, shares: Callable[[AtWavelengths], Sequence[Value]], count: int) -> list[Value]:
         """Colours that light may have, from shares at one wavelength."""
+        return [ops.clip(x, 0.0, 1.0) for x in self._colours(shares, count)]
 
+    def _colours(self, shares: Callable[[AtWavelengths], Sequence[Value]], count: int) -> list[Value]:
         def at(nm: Value) -> Sequence[Value]:
             return shares(AtWavelengths(nm, self.eta_1, self.films, self.eta_2, self.k_2, in_colours=True))
 
-        return [ops.clip(x, 0.0, 1.0) for x in self.quadrature.summed(at, count)]
+        return self.quadrature.summed(at, count)
 
 
 @dataclass(frozen=True, eq=False)

@@ -41,12 +41,15 @@ class Span:
         return ThicknessAxis.around(self.address.film, self.low, self.high, step(self.address, layer))
 
 
-def constant_films(material: Material, spans: Sequence[Span], number: Any) -> list[Coated | SpectralQuadrature | None]:
+def constant_films(
+    material: Material, spans: Sequence[Span], number: Any, polarised: bool = False
+) -> list[Coated | SpectralQuadrature | None]:
     """The films on each layer of a renderer's constants; differentiable.
 
     Args:
         spans: values from textures, of films and of indices, which then have any value in `material`.
         number: Dr.Jit's type of numbers, None in scalar variants.
+        polarised: whether light is, which tables over a thickness do not have.
     """
     given, start = Variables.of(material), plain(material)
     # Where an extinction varies it may be 0
@@ -55,7 +58,7 @@ def constant_films(material: Material, spans: Sequence[Span], number: Any) -> li
     may_absorb = {address.layer for address in varying if address.role == "film_k" and address.layer is not None}
     axes, points = dict[int, ThicknessAxis](), dict[int, SpectralQuadrature]()
     for k, layer, own in _films_with_textures(highest(start, spans), spans):
-        if [span.address.role for span in own] == ["film_thickness_nm"]:
+        if [span.address.role for span in own] == ["film_thickness_nm"] and not polarised:
             axes[k] = own[0].axis(layer)
         else:
             absorbs = k in may_absorb or any(np.any(film.k > 0) for film in layer.films)

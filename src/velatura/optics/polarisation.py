@@ -193,6 +193,41 @@ class Mueller:
             u * self.imaginary + v * self.real,
         )
 
+    def then(self, other: Mueller) -> Mueller:
+        """Matrix of this one and then another in the same frame, as of surfaces that are parallel."""
+        real = self.real * other.real - self.imaginary * other.imaginary
+        imaginary = self.real * other.imaginary + self.imaginary * other.real
+        return Mueller(self.s * other.s, self.p * other.p, real, imaginary)
+
+    def plus(self, other: Mueller) -> Mueller:
+        """Matrix of both together."""
+        return Mueller(self.s + other.s, self.p + other.p, self.real + other.real, self.imaginary + other.imaginary)
+
+    def repeated(self) -> Mueller:
+        """Sum of all powers of the matrix, from 0 on: of light that goes round any number of times."""
+        real = 1 - self.real
+        square = real * real + self.imaginary * self.imaginary
+        return Mueller(
+            *(ops.divide(1.0, 1 - part) for part in (self.s, self.p)),
+            *(ops.divide(part, square) for part in (real, self.imaginary)),
+        )
+
+    def times_share(self, share: Value) -> Mueller:
+        """Matrix of light of which a share is left."""
+        return Mueller(share * self.s, share * self.p, share * self.real, share * self.imaginary)
+
+    def bounded(self, most: Value = 1.0) -> Mueller:
+        """The nearest matrix that light can have, with up to `most` in the mean of s and p.
+
+        Colours outside sRGB are clipped as those of unpolarised light are.
+        """
+        both = 2 * ops.clip(0.5 * (self.s + self.p), 0.0, most)
+        s = ops.maximum(ops.minimum(self.s, ops.minimum(both, 1.0)), ops.maximum(both - 1, 0.0))
+        p = both - s
+        modulus = ops.sqrt(self.real * self.real + self.imaginary * self.imaginary)
+        bound = ops.minimum(ops.sqrt(s * p) / ops.maximum(modulus, 1e-9), 1.0)
+        return Mueller(s, p, bound * self.real, bound * self.imaginary)
+
 
 def mueller(amplitude_s: Complex, amplitude_p: Complex) -> Mueller:
     """Matrix of the amplitudes that a facet reflects; transmitted ones, if their squares are shares of the energy."""

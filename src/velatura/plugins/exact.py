@@ -64,13 +64,39 @@ class ExactStack(LayeredStack):
 
     def at(self, si: Any, asked: Asked, active: Any) -> PointBSDF:
         if self.delta:
-            return super().at(si, asked, active)
+            point = super().at(si, asked, active)
+            walked = WalkedPoint(self.walked, si, {}, asked.radiance)
+            polarises = self.mi.is_polarized and self.walked.layers(si, active, si.wi.z < 0).polarises
+            return SmoothPoint(point, walked) if polarises else point
         wanted = dict(zip(self.kinds, asked.components))
         passing = wanted.get(self.mi.BSDFFlags.GlossyTransmission, False)
         reflecting = sum(asked.components) > passing
         body = self.bodies.at(si, active).at_direction(tuple(si.wi))
         walked = WalkedPoint(self.walked, si, wanted, asked.radiance)
         return ExactPoint(self, body, Query(reflecting, passing, asked.radiance), walked)
+
+
+@dataclass(frozen=True)
+class SmoothPoint(PointBSDF):
+    """A smooth stack at a surface point in a polarised variant: the samples of a model, with Mueller matrices."""
+
+    model: PointBSDF
+    walked: WalkedPoint
+
+    def draw(self, sample1: Any, sample2: Any, active: Any) -> tuple[Any, Any]:
+        import drjit as dr
+
+        bs, weight = self.model.draw(sample1, sample2, active)
+        squeezed = bs.eta * bs.eta if self.walked.radiance else 1.0
+        matrix = self.walked.smooth(bs.wo) / (squeezed * dr.maximum(bs.pdf, 1e-9))
+        value = dr.select(active & (bs.pdf > 0), matrix, 0)
+        # Gradients are those of the model
+        if dr.grad_enabled(weight):
+            value = weight + dr.detach(value - weight)
+        return bs, value
+
+    def eval_pdf(self, wo: Any, active: Any) -> tuple[Any, Any]:
+        return self.model.eval_pdf(wo, active)
 
 
 @dataclass(frozen=True)

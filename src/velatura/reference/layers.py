@@ -13,10 +13,9 @@ from math import pi
 from typing import Any
 
 from velatura import metals, ops
-from velatura.films.of_material import SENSITIVITIES, films_of
-from velatura.films.polarised import PolarisedFilms, polarised_films
+from velatura.films.of_material import films_of
+from velatura.films.polarised import matrices, opaque_matrix, polarise
 from velatura.films.reflectance import InterfaceFilms
-from velatura.films.tables import Coated
 from velatura.media.of_material import phase_of
 from velatura.ops import Value
 from velatura.optics import fresnel, ggx
@@ -205,13 +204,8 @@ class WalkedLayers:
 
     @property
     def polarises(self) -> bool:
-        """Whether matrices of all films are known: not at the wavelengths of a ray, nor of a texture."""
-        known = (isinstance(films, Coated) and films.coating for films in self.films if films)
-        return all(known)
-
-    def _polarised(self, films: InterfaceFilms) -> PolarisedFilms:
-        assert isinstance(films, Coated) and films.coating
-        return polarised_films(films.coating, films.n12 is None, SENSITIVITIES[self.light])
+        """Whether matrices of all films are known."""
+        return all(polarise(films) for films in self.films if films)
 
     def mueller(self, j: Value, cosine: Value, n_in: Value, n_out: Value, above: Value) -> tuple[Mueller, Mueller]:
         """Mueller matrices of the light that a facet reflects, and refracts: `shares` of polarised light."""
@@ -223,15 +217,8 @@ class WalkedLayers:
         reflection = ops.select_record(passes, between, replace(total, s=1.0, p=1.0))
         refraction = complement(reflection)
         if any(self._on_dielectrics):
-            bare, above = (reflection, refraction), self._from_above(above)
-
-            def matrices(films: InterfaceFilms | None) -> tuple[Mueller, Mueller]:
-                if not films:
-                    return bare
-                assert isinstance(films, Coated)
-                return self._polarised(films).dielectric(films.from_rarer(above), cosine, cos_t, eta, n_in)
-
-            each = [matrices(films) for films in self._on_dielectrics]
+            bare, seen = (reflection, refraction), (self._from_above(above), cosine, cos_t, eta, n_in)
+            each = [matrices(films, self.light, *seen) if films else bare for films in self._on_dielectrics]
             reflection, refraction = (self._of_interface(column, j) for column in zip(*each))
         if self.base == "mirror":
             base = Mueller(1.0, 1.0, -1.0, 0.0)
@@ -241,7 +228,7 @@ class WalkedLayers:
                 Mueller(*map(self.metal.wide, vars(x).values())) for x in (reflection, refraction)
             )
         elif self.base == "conductor" and (films := self.films[-1]):
-            base = self._polarised(films).opaque(cosine, n_in)
+            base = opaque_matrix(films, self.light, cosine, n_in)
         elif self.base == "conductor":
             base = mueller(*fresnel.conductor_amplitudes(cosine, self.index[-1] / n_in, self.extinction / n_in))
         else:
@@ -251,6 +238,31 @@ class WalkedLayers:
     def _of_interface(self, items: Sequence[Any], j: Value) -> Any:
         """Value or record of surface j, among those of the interfaces as they are listed."""
         return ops.select_record(self.flipped, pick(items[::-1], j), pick(items, j))
+
+    def of_smooth(self, cosine: Value) -> tuple[Mueller, Mueller]:
+        """Matrices of all light that smooth surfaces reflect, and transmit, in the frame along them; nothing scatters.
+
+        Each surface in turn is put on top of those below it, between which light goes to and fro.
+        """
+        cosines = [cosine]
+        for k in range(self.count):
+            cosines.append(fresnel.cos_transmitted(cosines[k], relative_index(self.index[k], self.index[k + 1])))
+        passed = Mueller(1.0, 1.0, 1.0, 0.0)
+        reflected = passed.times_share(0.0)
+        for k in reversed(range(self.count)):
+            above, below = self.index[k], self.index[k + 1]
+            left = self.slabs[k + 1].straight(ops.divide(1.0, cosines[k + 1]))
+            reflection, refraction = self.mueller(k, cosines[k], above, below, True)
+            if k == self.count - 1 and not self.transmits:
+                reflected, passed = reflection, refraction
+                continue
+            back, out = self.mueller(k, cosines[k + 1], below, above, False)
+            returned = reflected.times_share(left * left)
+            inside = refraction.then(back.then(returned).repeated())
+            reflected = reflection.plus(inside.then(returned).then(out))
+            passed = inside.then(passed).times_share(left)
+        left = self.slabs[0].straight(ops.divide(1.0, cosine))
+        return reflected.times_share(left * left), passed.times_share(left)
 
     def meet(
         self,

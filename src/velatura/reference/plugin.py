@@ -243,6 +243,22 @@ class WalkedPoint:
         values = [dr.select(active, factor * layers.seen(x, mi.UnpolarizedSpectrum), 0) for x in path.value]
         return self._matrix(values, wo, turned, flipped) if polarised else mi.depolarizer(values[0])
 
+    def smooth(self, wo: Any) -> Any:
+        """Mueller matrix of a stack of smooth interfaces, for its mirrored direction or the refracted one."""
+        import drjit as dr
+
+        mi, wi = self.stack.mi, self.si.wi
+        flipped = wi.z < 0
+        layers = self.stack.layers(self.si, True, flipped)
+        found = ops.select_record(wi.z * wo.z > 0, *layers.of_smooth(dr.abs(wi.z)))
+        one = layers.start(mi.UnpolarizedSpectrum(1))
+        s, p, real, imaginary = (layers.seen(part * one, mi.UnpolarizedSpectrum) for part in vars(found).values())
+        both, more, none = 0.5 * (s + p), 0.5 * (s - p), 0.0 * s
+        rows = [both, more, none, none, more, both, none, none]
+        rows += [none, none, real, -imaginary, none, none, imaginary, real]
+        # Light that goes the other way has the same matrix
+        return self._matrix(rows, wo, mi.Bool(False), flipped)
+
     def _matrix(self, parts: list[Any], wo: Any, turned: Any, flipped: Any) -> Any:
         """Mueller matrix in the frames of the renderer, by its `parts` row by row, of light that walks in.
 
