@@ -14,6 +14,7 @@ from velatura import kernel, scenes
 from velatura.editor import rendering
 from velatura.editor.folder import Folder
 from velatura.errors import InvalidInput
+from velatura.scenes.denoise import DENOISER
 from velatura.scenes.environments import studio
 
 BODY = {**MIRROR, "samples": 40, "file": "ball.exr"}
@@ -174,7 +175,7 @@ def test_a_wrong_body_is_one_line(renderings: rendering.Renderings, changes: dic
 
 def test_a_picture_is_denoised(renderings: rendering.Renderings) -> None:
     """Expected: nearer to a picture of many samples than what it was made of."""
-    pytest.importorskip(rendering.DENOISER)
+    pytest.importorskip(DENOISER)
     rough = {"material": {"layers": [{"interface": {"conductor": "Au", "alpha": 0.4}}]}, "size": [64, 64]}
     many, _ = made(renderings, **rough, samples=256)
     few, _ = made(renderings, **rough, samples=4, key="two")

@@ -7,8 +7,6 @@ calls in between. A step is some samples of all pixels, or one of a band of a la
 from __future__ import annotations
 
 import functools
-import importlib.util
-import sys
 import threading
 from typing import Any, NamedTuple
 
@@ -19,9 +17,10 @@ from velatura import kernel
 from velatura.editor.folder import Folder
 from velatura.editor.messages import Answer, Body, Verb, admitting, field, material_of, model_of
 from velatura.editor.shot import LIGHT, Shot, sides
-from velatura.errors import InvalidInput, MissingTool
+from velatura.errors import InvalidInput
 from velatura.model import Model
 from velatura.scenes import check_view, write_image
+from velatura.scenes.denoise import check_denoiser, denoised
 from velatura.scenes.views import DEFAULT_VIEW
 from velatura.stack import Described
 
@@ -29,12 +28,6 @@ LARGEST = 4096  # pixels along a side
 MOST = 2**20  # samples of a step
 WRITTEN = (".png", ".exr")
 HIDDEN = ("plinth", "ground")  # where the ground is transparent
-DENOISER = "mitsuba_oidn"  # Open Image Denoise, by the makers of Mitsuba
-
-
-def can_denoise() -> bool:
-    """Whether Open Image Denoise is installed."""
-    return importlib.util.find_spec(DENOISER) is not None
 
 
 class Renderings:
@@ -82,9 +75,8 @@ class Renderings:
         file = None
         if environment.lower().endswith(LIGHT):
             file = self.folder.existing(environment, LIGHT).relative_to(self.folder.path)
-        if body.get("denoised") and not can_denoise():
-            mend = f"{sys.executable} -m pip install 'velatura[denoise]'"
-            raise MissingTool(f"Open Image Denoise is missing: run `{mend}`")
+        if body.get("denoised"):
+            check_denoiser()
         kind = Kind(*(body.get(key, False) for key in Kind._fields))
         shot, size = Shot.of(body, file), sides(body, LARGEST)
         return Picture(material_of(body), model_of(body), shot, size, body.get("samples", 64), kind)
@@ -133,8 +125,7 @@ class Picture:
         """The picture of all samples, its colours weighed by alpha."""
         image = self.total / np.float32(self.samples)
         if self.kind.denoised:
-            denoiser = importlib.import_module(DENOISER)
-            image[..., :3] = denoiser.denoise(np.ascontiguousarray(image[..., :3]), hdr=True)
+            image[..., :3] = denoised(image[..., :3])
         return image
 
     @kernel.exclusive
@@ -161,7 +152,7 @@ class Picture:
             scene = {name: part for name, part in scene.items() if name not in HIDDEN}
             scene["integrator"] = {**scene["integrator"], "hide_emitters": True}
             film = {**film, "pixel_format": "rgba"}
-        if self.kind.denoised:  # noise that neighbours share is taken for a pattern
+        if self.kind.denoised:
             film = {**film, "rfilter": {"type": "box"}}
         scene["sensor"] = {**scene["sensor"], "film": film}
         return mi.load_dict(scene), scene["sensor"]

@@ -16,7 +16,7 @@ from numpy.typing import ArrayLike
 from pydantic.fields import FieldInfo
 
 from velatura import kernel
-from velatura.editor import appearance, class_maps, exporting, films, rendering, truth, validations, views, wishes
+from velatura.editor import appearance, class_maps, exporting, films, truth, validations, views, wishes
 from velatura.editor.messages import (
     Answer,
     Body,
@@ -33,6 +33,7 @@ from velatura.editor.shading import contents, shading
 from velatura.editor.shading import tables as kept_tables
 from velatura.errors import InvalidInput
 from velatura.model import DEFAULT, MODELS, SWITCHES, Model
+from velatura.scenes.denoise import can_denoise
 from velatura.scenes.environments import PHOTOGRAPHS, sky, studio
 from velatura.scenes.objects import OBJECTS, ground, plinth
 from velatura.scenes.surfaces import Mesh
@@ -121,7 +122,7 @@ def _constants() -> Answer:
         "models": [_model(model) for model in MODELS],
         "default_model": DEFAULT,
         "formats": exporting.formats(),
-        "denoises": rendering.can_denoise(),
+        "denoises": can_denoise(),
         "names": _names(),
         "objects": list(OBJECTS),
         "views": views.views(),
