@@ -1,6 +1,6 @@
 """Build the wheel and the source distribution, and install each into empty environments of every Python.
 
-    python tools/check_release.py [--pythons 3.10 3.13] [--folder dist]
+    python tools/check_release.py [--pythons 3.10 3.14] [--folder dist]
 
 The wheel must have `LARGEST` bytes at most, and both files pass `twine check`, as the index demands. Each environment
 sees nothing but the package index and the system's libraries: no Node, no compiler, no variable of the caller. In it,
