@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-import html
+import shutil
+import sys
 from abc import ABC, abstractmethod
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, fields, replace
@@ -14,7 +15,7 @@ if TYPE_CHECKING:
     from rich.table import Table as RichTable
 
 LINES = 24  # of a printed result
-WIDTH = 120  # characters of a line
+WIDTH = 120  # characters of a line, or as many as the terminal has
 WIDE = 90  # characters of a value
 
 
@@ -57,10 +58,11 @@ class Table:
 
     def html(self) -> str:
         """The table for a notebook, with all text escaped."""
+        from html import escape
 
         def cell(tag: str, heading: str, text: str) -> str:
             side = "right" if heading in self.right else "left"
-            return f'<{tag} style="text-align: {side}">{html.escape(text).replace(chr(10), "<br>")}</{tag}>'
+            return f'<{tag} style="text-align: {side}">{escape(text).replace(chr(10), "<br>")}</{tag}>'
 
         head = "".join(cell("th", heading, heading) for heading in self.columns)
         rows = (
@@ -69,8 +71,8 @@ class Table:
             if row is not None
         )
         body = "".join(f"<tr>{row}</tr>" for row in rows)
-        title = f'<caption style="text-align: left">{html.escape(self.title)}</caption>' if self.title else ""
-        caption = f"<p>{html.escape(self.caption)}</p>" if self.caption else ""
+        title = f'<caption style="text-align: left">{escape(self.title)}</caption>' if self.title else ""
+        caption = f"<p>{escape(self.caption)}</p>" if self.caption else ""
         return f"<table>{title}<thead><tr>{head}</tr></thead><tbody>{body}</tbody></table>{caption}"
 
     def shortened(self, most: int) -> Table:
@@ -104,7 +106,11 @@ class Result(ABC):
         tables = self.brief()
         frame = sum(4 + bool(table.title) + bool(table.caption) for table in tables)  # lines around the rows
         most = max((LINES - frame - len(tables)) // max(len(tables), 1), 1)
-        return printed([table.shortened(most) for table in tables])
+        text = printed([table.shortened(most) for table in tables])
+        while most > 1 and text.count("\n") >= LINES:  # a narrow terminal folds rows
+            most -= 1
+            text = printed([table.shortened(most) for table in tables])
+        return text
 
     def _repr_html_(self) -> str:
         return "".join(table.html() for table in self.as_tables())
@@ -136,10 +142,12 @@ def _summary(value: Any) -> str:
 
 
 def printed(tables: Sequence[Table]) -> str:
-    """Tables as plain text."""
+    """Tables as plain text, as wide as the terminal at most."""
     from rich.console import Console
 
-    console = Console(width=WIDTH, markup=False, emoji=False, color_system=None, force_terminal=False)
+    terminal = sys.stdout and sys.stdout.isatty()  # Windows' pythonw has no output
+    width = min(shutil.get_terminal_size().columns, WIDTH) if terminal else WIDTH
+    console = Console(width=width, markup=False, emoji=False, color_system=None, force_terminal=False)
     with console.capture() as captured:
         for table in tables:
             console.print(table)

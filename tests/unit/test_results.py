@@ -60,6 +60,16 @@ def test_every_result_is_printed_in_a_few_lines(name: str) -> None:
     assert len(text) < 5000
 
 
+@pytest.mark.parametrize("name", ["coat", "imported", "bake", "lobes", "fit"])
+def test_a_result_fits_into_a_terminal(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Expected: no line is wider than the terminal, which would break it, and no more lines than elsewhere."""
+    found = RESULTS[name]()
+    monkeypatch.setenv("COLUMNS", "80")
+    monkeypatch.setattr("sys.stdout.isatty", lambda: True)
+    lines = repr(found).splitlines()
+    assert max(map(len, lines)) <= 80 and len(lines) <= LINES
+
+
 def test_a_stack_reads_as_its_repr() -> None:
     stack = vt.preset("coated-gold")
     assert eval(repr(stack), {**vars(vt), "Stack": vt.Stack, "Interface": vt.Interface, "Medium": vt.Medium}) == stack
