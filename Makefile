@@ -62,7 +62,7 @@ site/try/index.html: $(PAGE) $(SOURCES) | .venv/ready-docs
 	$(BIN)/velatura edit --static site/try
 	@touch $@
 
-figures: .venv/ready ## compute the figures of the manual again that are missing, or whose sources have changed
+figures: .venv/ready-dev ## compute the figures of the manual again that are missing, or whose sources have changed
 	$(BIN)/velatura figure --all -o docs/figures
 
 setup: .venv/ready-dev ## install what development needs, and the pre-commit hooks

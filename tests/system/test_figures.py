@@ -548,6 +548,36 @@ def test_costs_are_ratios_round_by_round(monkeypatch: pytest.MonkeyPatch) -> Non
     assert evaluation.costs({}, {"a": "b"}, 3, 0, 1) == {"sample": {"a": {"median": 3, "quartiles": [2.5, 3.5]}}}
 
 
+def test_errors_are_those_of_coarse_pictures_and_free_of_noise() -> None:
+    """Rationale: finer pictures of as many samples have more noise a pixel. Expected: the difference that was added."""
+    rng = np.random.default_rng(0)
+    passes = rng.normal(0.5, 0.2, (2, canvas.PASSES, 512, 512, 3)).astype(np.float32)
+    passes[0] += 0.01
+    found, error = canvas.rmse(passes[0], passes[1])
+    assert found == pytest.approx(0.01, abs=4 * error) and error < 1e-3
+    assert canvas.coarse(passes[0]).shape == (canvas.PASSES, 128, 128, 3)
+    small = np.ones((24, 24, 3))
+    np.testing.assert_allclose(canvas.coarse(small), small, rtol=1e-12)
+
+
+@pytest.mark.parametrize("ending", ["png", "webp"])
+def test_every_pixel_of_a_picture_is_drawn(ending: str, tmp_path: Path) -> None:
+    """Expected: so, however small it is on its page; figures without pictures are as large as pages."""
+    from PIL import Image
+
+    sizes = []
+    for size in (512, 0):
+        figure = canvas.canvas(3, 1.5)
+        axes = figure.subplots(1, 2)
+        if size:
+            canvas.show(axes[0], np.full((size, size, 3), 0.5), "")
+        canvas.save(figure, tmp_path / f"{size}.{ending}")
+        sizes.append(Image.open(tmp_path / f"{size}.{ending}"))
+    grey = np.all(np.asarray(sizes[0].convert("RGB")) < 250, axis=-1)
+    assert grey[:, : grey.shape[1] // 2].any(axis=1).sum() >= 512
+    assert sizes[1].size == (360, 180)
+
+
 # The verb
 
 

@@ -59,7 +59,7 @@ def draw(figure: Any, numbers: dict[str, Any]) -> None:
         for n, (axes, members) in enumerate(zip(column, solution.classes)):
             plots.draw(axes, members, solution.layers[2 * n : 2 * n + 2])
             axes.set_title(f"{order.partition(' ')[2]}: {'lower' if n else 'upper'} lobe", fontsize="medium")
-    seen = {order: np.array(picture) for order, picture in numbers["pictures"].items()}
+    seen = canvas.shown(numbers["pictures"])
     labels = [order.partition(" ")[2] for order in ORDERS]
     looks.split(sphere, looks.halves(looks.Panel("", ORDERS), seen), "", labels)
     angles = np.degrees(np.arccos(numbers["cosines"]))

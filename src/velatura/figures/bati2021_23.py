@@ -42,8 +42,8 @@ def draw(figure: Any, numbers: dict[str, Any]) -> None:
     plots.draw(members, bati2021_15.members("15 b"))
     looks.mark(members, [numbers[name]["indices"] for name in names], names)
     members.set_title("(a) class", fontsize="medium")
-    for axes, part, name in zip(spheres, "bc", names):
-        canvas.show(axes, np.array(numbers["pictures"][name]), f"({part}) {name}")
+    for axes, part, (name, picture) in zip(spheres, "bc", canvas.shown(numbers["pictures"]).items()):
+        canvas.show(axes, picture, f"({part}) {name}")
     angles = np.degrees(np.arccos(numbers["cosines"]))
     for axes, key in ((reflected, "reflected"), (transmitted, "transmitted")):
         looks.curves(axes, angles, [np.array(numbers[name][key]) for name in names], names)

@@ -8,8 +8,6 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any
 
-import numpy as np
-
 from velatura.figures import Progress, canvas
 from velatura.stack import preset
 
@@ -53,15 +51,13 @@ def draw(figure: Any, numbers: dict[str, Any]) -> None:
     """A row for each preset: the models, the reference, and where models are too bright (red) or too dark (blue)."""
     figure.set_size_inches(10, 2.1 * len(numbers["presets"]))
     axes = figure.subplots(len(numbers["presets"]), 5, squeeze=False)
-    for row, modelled, seen in zip(axes, numbers["presets"], numbers["pictures"]):
-        truth = np.array(seen["reference"])
+    for row, modelled, pictures in zip(axes, numbers["presets"], numbers["pictures"]):
+        seen = canvas.shown(pictures)
         for axis, model in zip(row, MODELS):
             canvas.show(axis, seen[model], "")
             axis.set_title(f"{modelled['name']}\n{model}", fontsize=8)
         canvas.show(row[2], seen["reference"], "")
         row[2].set_title("reference", fontsize=8)
         for axis, model in zip(row[3:], MODELS):
-            difference = (np.array(seen[model]) - truth).mean(axis=-1)
-            axis.imshow(difference, cmap="RdBu_r", vmin=-SCALE, vmax=SCALE)
+            canvas.show_difference(axis, seen[model], seen["reference"], SCALE, "")
             axis.set_title(f"{model} - reference\n{canvas.error_label(modelled, model)}", fontsize=8)
-            axis.set_axis_off()

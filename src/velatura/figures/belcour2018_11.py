@@ -65,8 +65,9 @@ def draw(figure: Any, numbers: dict[str, Any]) -> None:
     titles |= {"all": "reference, all bounces", "single": "reference, one reflection a layer"}
     styles = canvas.STYLES | {"all": {"color": "black"}, "single": {"color": "black", "linestyle": "--"}}
     angles = np.degrees(np.arccos(numbers["cos"]))
+    seen = canvas.shown(numbers["pictures"])
     for axes, (column, title) in zip(spheres, titles.items()):
-        canvas.show(axes, numbers["pictures"][column], title)
+        canvas.show(axes, seen[column], title)
         plot.plot(angles, numbers["saturation"][column], marker=".", label=title, **styles[column])
     plot.set(title="saturation, 1 - blue / red", xlabel="angle of incidence (°)", ylim=(0, None))
     plot.legend(fontsize="small")

@@ -45,9 +45,10 @@ def compute(
 def draw(figure: Any, numbers: dict[str, Any]) -> None:
     """A row for each stack: the spheres in the furnace, and the energy that is kept over the angle."""
     for row, name in zip(figure.subplots(2, 5, width_ratios=(1, 1, 1, 1, 1.4)), STACKS):
+        seen = canvas.shown(numbers["pictures"][name])
         for plot, (column, style) in zip(row, canvas.STYLES.items()):
             # Half as bright, since white and brighter would look the same
-            canvas.show(plot, 0.5 * np.array(numbers["pictures"][name][column]), f"{column}, {name}")
+            canvas.show(plot, 0.5 * seen[column], f"{column}, {name}")
             row[-1].plot(numbers["angles"], numbers[name][column], marker=".", label=column, **style)
         row[-1].axhline(1, color="0.7", linewidth=1)
         row[-1].set(title=f"energy kept, {name}", xlabel="angle of incidence (°)", ylim=(0, None))

@@ -63,11 +63,11 @@ def _blur(wo: Any, grey: Any, cosine: float) -> float:
 def draw(figure: Any, numbers: dict[str, Any]) -> None:
     """The spheres in a row, and what each model has too much (red) or too little (blue)."""
     axes = figure.subplots(2, 4)
-    truth = np.array(numbers["pictures"]["reference"])
+    seen = canvas.shown(numbers["pictures"])
     for column, name in zip(axes.T, canvas.COLUMNS):
-        image = np.array(numbers["pictures"][name])
-        canvas.show(column[0], image, name)
+        canvas.show(column[0], seen[name], name)
         if name != "reference":
-            drawn = canvas.show_difference(column[1], image, truth, 0.1, canvas.error_label(numbers, name))
+            error = canvas.error_label(numbers, name)
+            drawn = canvas.show_difference(column[1], seen[name], seen["reference"], 0.1, error)
     axes[1, -1].set_axis_off()
     figure.colorbar(drawn, ax=axes, shrink=0.5, label="minus the reference")

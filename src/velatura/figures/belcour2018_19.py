@@ -63,7 +63,8 @@ def draw(figure: Any, numbers: dict[str, Any]) -> None:
     count = len(numbers["cells"])
     figure.set_size_inches(2.6 * count + 0.6, 12.3)
     axes = figure.subplots(5, count, squeeze=False)
-    for column, cell, seen in zip(axes.T, numbers["cells"], numbers["pictures"]):
+    for column, cell, pictures in zip(axes.T, numbers["cells"], numbers["pictures"]):
+        seen = canvas.shown(pictures)
         canvas.show(column[0], seen["reference"], f"reference, {cell['name']}")
         for n, form in enumerate(canvas.FORMS):
             canvas.show(column[2 * n + 1], seen[form], f"{form}, variation {cell['total_variation'][form]:.2f}")

@@ -68,6 +68,7 @@ def draw(figure: Any, numbers: dict[str, Any]) -> None:
     columns = len(numbers["cells"]) // rows
     figure.set_size_inches(4 * columns, 2.5 * rows)
     pairs = figure.subplots(rows, 2 * columns, squeeze=False).reshape(-1, 2)
-    for (left, right), cell, seen in zip(pairs, numbers["cells"], numbers["pictures"]):
+    for (left, right), cell, pictures in zip(pairs, numbers["cells"], numbers["pictures"]):
+        seen = canvas.shown(pictures)
         canvas.show(left, seen["model"], cell["name"].replace(", ", "\n"))
         canvas.show(right, seen["reference"], f"reference\n{canvas.error_label(cell, FORMS[0])}")

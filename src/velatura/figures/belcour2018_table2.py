@@ -20,7 +20,7 @@ from typing import Any
 
 import numpy as np
 
-from velatura import kernel, scenes
+from velatura import kernel
 from velatura.figures import Progress, canvas, evaluation
 from velatura.stack import Stack, preset
 
@@ -85,7 +85,7 @@ def _rendered(name: str, size: int, spp: int, repeats: int, seed: int) -> tuple[
     loaded = {}
     for column, (model, switches) in COLUMNS.items():
         bsdf = canvas.bsdf(_for(model, preset(material)), model, **switches)
-        described = scenes.scene_dict(shape, env, bsdf, (size, size))
+        described = canvas.staged(bsdf, shape, env, size)
         integrator = described["integrator"]
         loaded[column] = mi.load_dict(described | {"integrator": integrator | ({"max_depth": depth} if depth else {})})
     return canvas.timed(loaded, spp, repeats, seed)
@@ -115,8 +115,8 @@ def draw(figure: Any, numbers: dict[str, Any]) -> None:
     rows = figure.subplots(len(numbers["scenes"]), len(widths), squeeze=False, width_ratios=widths)
     shown = [column for column in COLUMNS if column != BASELINE]
     for row, (name, found) in zip(rows, numbers["scenes"].items()):
-        for plot, column in zip(row, COLUMNS):
-            canvas.show(plot, 0.5 * np.array(numbers["pictures"][name][column]), column)
+        for plot, (column, picture) in zip(row, canvas.shown(numbers["pictures"][name]).items()):
+            canvas.show(plot, 0.5 * picture, column)
         given = {"paper": found["paper"], **found["evaluation"], "a picture, untextured": found["ratio"]}
         groups = {title: {key: each.get(key, np.nan) for key in shown} for title, each in given.items()}
         evaluation.bars(row[-1], groups, ["model", "no tables", "walk"])

@@ -10,12 +10,14 @@ from typing import Any, TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
+from scipy.ndimage import gaussian_filter
 
 from velatura import api, files, kernel, scenes
 from velatura.checks.probe import Probe, ProbeSamples
 from velatura.comparison import check_figure
 from velatura.errors import needs
 from velatura.figures import Progress
+from velatura.scenes.denoise import can_denoise, denoised
 from velatura.stack import Measured, Stack, Texture
 
 Array = NDArray[np.floating]
@@ -23,12 +25,14 @@ Item = TypeVar("Item")
 Paint = Callable[[Any, dict[str, Any]], None]
 Draw = Callable[[dict[str, Any], str | Path], None]
 
-SIZE, SAMPLES = 128, 128  # of a picture: pixels along a side, and samples of each
+SIZE, SAMPLES = 512, 8  # of a picture: pixels along a side, and samples of each
+COARSE = 128  # pixels along a side of pictures that are compared, at most: finer ones have more noise
 PASSES = 8  # of a picture, each of its own random numbers: the noise of an error is that between them
-DPI = 120  # of what is drawn
-PAGE = (1200, 1250)  # pixels across and down, at most, of a .webp, which stands on a web page
+DPI = 120  # of what is drawn, at least: a picture has all its pixels
+PAGE = (1200, 1250)  # pixels across and down, at most, of a .webp without pictures, which stands on a web page
 QUALITY = 60  # of a .webp
-PASS_SAMPLES = 16  # of a pixel in a pass, where there are so many: a pass has a cost of its own
+PASS_SAMPLES = 2**18  # of a pass, where there are so many: a pass has a cost of its own
+PICTURE = "picture"  # the group of matplotlib's images that are rendered
 #: Of every model: light meets one facet of an interface at a time, as in the reference that it is compared with.
 CHOICES: dict[str, Any] = {"reflectance": "fgd"}
 #: The model of Belcour 2018 in the form that the paper renders offline (its section 7), and in the other one.
@@ -75,10 +79,19 @@ def pictures(scene: str, stack: Stack, model: str, env: str, size: int, spp: int
 
 def taken(made: Any, name: str, scene: str, env: str, size: int, spp: int, seed: int) -> Array:
     """Pictures of a BSDF, whose name chooses its random numbers, as those of `pictures`."""
-    count = min(max(spp // PASS_SAMPLES, 3), PASSES)  # no fewer than a standard error takes
+    mi = kernel.mitsuba()
+    count = min(max(size**2 * spp // PASS_SAMPLES, 3), PASSES)  # no fewer than a standard error takes
     numbers = np.random.default_rng([seed, *name.encode()]).integers(2**31, size=count)
-    passes = [scenes.render(made, scene, env, max(spp // count, 1), (size, size), int(number)) for number in numbers]
-    return np.array(passes)
+    loaded = kernel.load_dict(staged(made, scene, env, size))
+    kernel.limit_threads()
+    return np.array([mi.render(loaded, spp=max(spp // count, 1), seed=int(number)) for number in numbers])
+
+
+def staged(made: Any, scene: str, env: str, size: int) -> dict[str, Any]:
+    """The scene of a BSDF, as `mi.load_dict` takes it, for pictures whose pixels share no noise."""
+    described = scenes.scene_dict(scene, env, made, (size, size))
+    described["sensor"]["film"]["rfilter"] = {"type": "box"}
+    return described
 
 
 def texture(path: Path, image: ArrayLike) -> Texture:
@@ -122,13 +135,23 @@ def sampled(made: Any, cosine: float, paths: int, seed: int) -> ProbeSamples:
     return Probe(made).sample(np.tile(wi, (paths, 1)), u)
 
 
+def coarse(pixels: ArrayLike) -> Array:
+    """Pictures (..., n, n, 3) as of `COARSE` pixels along a side, or of n, with the filter of Mitsuba's films."""
+    image = np.asarray(pixels)
+    width = max(image.shape[-2] // COARSE, 1)
+    count = image.shape[-2] // width
+    smooth = gaussian_filter(image, width / 2, axes=(-3, -2))[..., : count * width, : count * width, :]
+    blocks = smooth.reshape(*image.shape[:-3], count, width, count, width, image.shape[-1])
+    return np.asarray(blocks.mean(axis=(-4, -2)))
+
+
 def rmse(passes: Array, others: Array) -> tuple[float, float]:
-    """Root mean square difference of two pictures over pixels and colours, and its standard error.
+    """Root mean square difference of two pictures over `coarse` pixels and colours, and its standard error.
 
     Both are given in passes. Noise is independent between passes, so that it cancels from the mean of the products of
     different passes' differences. The standard error is the jackknife's, over passes.
     """
-    differences = (passes - others).reshape(len(passes), -1)
+    differences = coarse(passes - others).reshape(len(passes), -1)
     products = differences @ differences.T / differences.shape[1]
     np.fill_diagonal(products, 0)
 
@@ -187,9 +210,15 @@ def error_label(numbers: Mapping[str, Any], name: str) -> str:
     return f"RMSE {numbers['rmse'][name]:.4f} ± {numbers['rmse_error'][name]:.4f}"
 
 
+def shown(pictures: Mapping[str, ArrayLike]) -> dict[str, Array]:
+    """Pictures by name as they are drawn: without their noise, where Open Image Denoise is installed."""
+    calm = denoised if can_denoise() else np.asarray
+    return {name: calm(picture) for name, picture in pictures.items()}
+
+
 def show(axes: Any, image: ArrayLike, title: str) -> None:
     """A picture, tone-mapped, with a title."""
-    axes.imshow(scenes.tone_map(image))
+    axes.imshow(scenes.tone_map(image), gid=PICTURE)
     axes.set_title(title, fontsize="medium")
     axes.set_axis_off()
 
@@ -205,8 +234,25 @@ def show_difference(axes: Any, image: ArrayLike, truth: ArrayLike, bound: float,
 def save(figure: Any, path: str | Path) -> None:
     """Write a matplotlib figure whole or not at all. Raises InvalidInput where that cannot be done."""
     target = check_figure(path)
-    options: dict[str, Any] = {"dpi": DPI}
+    sharp = _sharp(figure)
+    options: dict[str, Any] = {"dpi": max(DPI, sharp)}
     if target.suffix.lower() == ".webp":
-        options = {"dpi": min(DPI, *(PAGE / figure.get_size_inches())), "pil_kwargs": {"quality": QUALITY}}
+        dpi = options["dpi"] if sharp else min(DPI, *(PAGE / figure.get_size_inches()))
+        options = {"dpi": dpi, "pil_kwargs": {"quality": QUALITY}}
     with files.whole(target) as unfinished:
         figure.savefig(unfinished, **options)
+
+
+def _sharp(figure: Any) -> float:
+    """Dots per inch by which every pixel of the pictures of a figure is drawn; 0 without pictures."""
+    figure.draw_without_rendering()  # which lays it out
+    inches = figure.dpi_scale_trans.inverted()
+    return max(
+        (
+            image.get_size()[0] / axes.get_window_extent().transformed(inches).height
+            for axes in figure.axes
+            for image in axes.images
+            if image.get_gid() == PICTURE
+        ),
+        default=0.0,
+    )

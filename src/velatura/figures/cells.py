@@ -31,7 +31,7 @@ class Quality(NamedTuple):
 
 
 QUALITY = Quality()
-TEASER = Quality(256, 64)
+TEASER = Quality(spp=16)
 
 
 @dataclass(frozen=True)
@@ -142,11 +142,12 @@ def draw(numbers: dict[str, Any], path: str | Path, exposure: float = 1.0, bound
     every = figure.subplots(rows, columns, squeeze=False)
     for axes in every.flat:
         axes.set_axis_off()
-    for places, cell, seen in zip(grid, cells, numbers["pictures"]):
+    for places, cell, pictures in zip(grid, cells, numbers["pictures"]):
+        seen = canvas.shown(pictures)
         line = [every[tuple(place)] for place in places]
-        canvas.show(line[0], exposure * np.array(seen["reference"]), f"reference, {cell['name']}")
+        canvas.show(line[0], exposure * seen["reference"], f"reference, {cell['name']}")
         for n, title in enumerate(titles):
-            canvas.show(line[2 * n + 1], exposure * np.array(seen[title]), title)
+            canvas.show(line[2 * n + 1], exposure * seen[title], title)
             error = canvas.error_label(cell, title)
             drawn = canvas.show_difference(line[2 * n + 2], seen[title], seen["reference"], bound, error)
     figure.colorbar(drawn, ax=every[-1, :], shrink=0.8, label="minus the reference")

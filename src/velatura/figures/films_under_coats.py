@@ -123,7 +123,8 @@ def draw(figure: Any, numbers: dict[str, Any]) -> None:
     """A row for each material: spheres, and the colours of all reflected light from the normal to grazing angles."""
     figure.set_size_inches(2.1 * (len(COLUMNS) + 1), 2.2 * len(numbers["cells"]))
     axes = figure.subplots(len(numbers["cells"]), len(COLUMNS) + 1, squeeze=False)
-    for row, cell, seen in zip(axes, numbers["cells"], numbers["pictures"]):
+    for row, cell, pictures in zip(axes, numbers["cells"], numbers["pictures"]):
+        seen = canvas.shown(pictures)
         for axis, who in zip(row, COLUMNS):
             canvas.show(axis, seen[who], "")
             said = cell["name"] if who == TRUTH else canvas.error_label(cell, who)

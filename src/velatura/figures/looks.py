@@ -26,7 +26,7 @@ Array = NDArray[np.floating]
 
 MODEL = "bati2021"
 COSINES = (1.0, 0.9, 0.8, 0.7, 0.6, 0.5, 0.4, 0.3, 0.2, 0.1)
-SIZE, SAMPLES = 256, 64  # of a picture: pixels along a side, and samples of each
+SIZE, SAMPLES = canvas.SIZE, 16  # of a picture: pixels along a side, and samples of each
 
 WIDTH, HEIGHT = 3.1, 2.6  # of a panel's column, and of a row, in inches
 STYLES = ("-", "--")  # of the left half, and of the right one
@@ -103,7 +103,7 @@ class Looks:
             InvalidInput: the file cannot be written.
         """
         looks = {look["name"]: look for look in numbers["looks"]}
-        seen = {name: np.array(picture) for name, picture in zip(looks, numbers["pictures"])}
+        seen = canvas.shown(dict(zip(looks, numbers["pictures"])))
         angles = np.degrees(np.arccos(numbers["cosines"]))
 
         # List the rows: the label of their axis, and what draws a panel
@@ -130,7 +130,7 @@ class Looks:
         for axes in grid[-1]:
             axes.set_xlabel("angle of incidence (°)")
         if self.inset:
-            enlarge(grid[0 if self.chart is None else 1], [halves(panel, seen) for panel in self.panels])
+            enlarge(grid[0 if self.chart is None else 1])
         canvas.save(figure, path)
 
 
@@ -309,16 +309,17 @@ def lower(panel: Panel, seen: Mapping[str, Array]) -> Array:
     return np.maximum(seen[panel.names[0]] - seen[str(panel.upper)], 0)
 
 
-def enlarge(row: Sequence[Any], shown: Sequence[Array]) -> None:
+def enlarge(row: Sequence[Any]) -> None:
     """Draw, in each picture, that part of it larger in which they differ most."""
+    shown = [axes.images[0].get_array() for axes in row]
     size = len(shown[0])
     width = max(round(INSET * size), 2)
-    apart = np.ptp([scenes.tone_map(picture) for picture in shown], axis=0).mean(axis=-1)
+    apart = np.ptp(shown, axis=0).mean(axis=-1)
     total = np.pad(apart.cumsum(axis=0).cumsum(axis=1), ((1, 0), (1, 0)))
     sums = total[width:, width:] - total[:-width, width:] - total[width:, :-width] + total[:-width, :-width]
     y, x = np.unravel_index(np.argmax(sums), sums.shape)
     for axes, picture in zip(row, shown):
         larger = axes.inset_axes((0.62, 0.0, 0.38, 0.38))
-        larger.imshow(scenes.tone_map(picture[y : y + width, x : x + width]), extent=(x, x + width, y + width, y))
+        larger.imshow(picture[y : y + width, x : x + width], extent=(x, x + width, y + width, y))
         larger.set(xticks=(), yticks=())
         axes.indicate_inset_zoom(larger, edgecolor="white", alpha=1.0, linewidth=1.2)

@@ -15,7 +15,7 @@ from typing import Any
 
 import numpy as np
 
-from velatura import kernel, scenes
+from velatura import kernel
 from velatura.figures import Progress, canvas, evaluation
 from velatura.figures.weier2020 import CHOICES, stack
 from velatura.stack import Stack
@@ -43,7 +43,7 @@ def compute(
         shape, metal = SCENES[name]
         stacks = {model: stack(COAT, alpha) for model, alpha in zip(COLUMNS, (ISOTROPIC, metal))}
         loaded = {
-            model: kernel.load_dict(scenes.scene_dict(shape, "studio", bsdf, (size, size)))
+            model: kernel.load_dict(canvas.staged(bsdf, shape, "studio", size))
             for model, bsdf in _bsdfs(stacks).items()
         }
         images, times = canvas.timed(loaded, spp, repeats, seed)
@@ -72,8 +72,8 @@ def draw(figure: Any, numbers: dict[str, Any]) -> None:
     """A row for each scene: both pictures, and the cost of the second over that of the first."""
     rows = figure.subplots(2, 3, width_ratios=(1, 1, 1.2))
     for row, (name, found) in zip(rows, numbers["scenes"].items()):
-        for axes, (model, image) in zip(row, numbers["pictures"][name].items()):
-            canvas.show(axes, 0.4 * np.array(image), f"{name}, {model}")
+        for axes, (model, picture) in zip(row, canvas.shown(numbers["pictures"][name]).items()):
+            canvas.show(axes, 0.4 * picture, f"{name}, {model}")
         alone = {function: each["weier2020"] for function, each in found["evaluation"].items()}
         shown = {"paper": found["paper"], **alone, "picture,\nuntextured": found["ratio"]}
         evaluation.bars(row[-1], {"": shown}, list(shown))
