@@ -147,7 +147,9 @@ def printed(tables: Sequence[Table]) -> str:
 
     terminal = sys.stdout and sys.stdout.isatty()  # Windows' pythonw has no output
     width = min(shutil.get_terminal_size().columns, WIDTH) if terminal else WIDTH
-    console = Console(width=width, markup=False, emoji=False, color_system=None, force_terminal=False)
+    console = Console(
+        width=width, markup=False, emoji=False, color_system=None, force_terminal=False, force_jupyter=False
+    )  # which would show an empty output in a notebook
     with console.capture() as captured:
         for table in tables:
             console.print(table)

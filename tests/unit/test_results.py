@@ -70,6 +70,14 @@ def test_a_result_fits_into_a_terminal(name: str, monkeypatch: pytest.MonkeyPatc
     assert max(map(len, lines)) <= 80 and len(lines) <= LINES
 
 
+def test_a_repr_shows_nothing_in_a_notebook(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Rationale: Rich sends what it prints to a notebook, which then has an empty output beside the result's own."""
+    sent: list[Any] = []
+    monkeypatch.setattr("rich.console._is_jupyter", lambda: True)
+    monkeypatch.setattr("rich.jupyter.display", lambda *given: sent.append(given))
+    assert "R2" in repr(RESULTS["lobes of a mixture"]()) and sent == []
+
+
 def test_a_stack_reads_as_its_repr() -> None:
     stack = vt.preset("coated-gold")
     assert eval(repr(stack), {**vars(vt), "Stack": vt.Stack, "Interface": vt.Interface, "Medium": vt.Medium}) == stack
