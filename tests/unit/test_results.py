@@ -50,7 +50,21 @@ RESULTS: dict[str, Callable[[], Any]] = {
     "imported": lambda: vt.from_openpbr(base_metalness=0.5, specular_roughness=0.2, subsurface_weight=0.3),
     "bake": lambda: vt.bakes.bake("coated-gold", "gltf"),
     "directions": lambda: table_of(3).directions,
+    "interface": lambda: vt.Interface(eta=1.5, films=(vt.Film(eta=1.46, thickness_nm=320),)),
+    "film": lambda: vt.Film(eta=1.46, thickness_nm=320),
+    "medium": lambda: vt.Medium(sigma_s=1.0),
+    "diffuse base": lambda: vt.Diffuse(albedo=0.5),
+    "texture": lambda: vt.Texture(texture=Path(vt.__file__).parent / "stack" / "presets" / "wear.png"),
+    "spectrum": lambda: vt.Spectrum(spectrum=[[nm, 0.5] for nm in np.linspace(400, 700, 1000)]),
+    "substance": lambda: vt.Substance(refractiveindex="main/Au/Johnson"),
+    "pigment": lambda: vt.Pigment(K=[0.1, 0.2, 2.0], S=1.0),
+    "axis": lambda: vt.Axis(values=list(np.linspace(0.1, 0.9, 1000))),
+    "space": lambda: vt.Space(material=mixture(), vary={"part0_layer0_alpha": {"range": [0.1, 0.5], "steps": 3}}),
 }
+#: Of `RESULTS`, by the class that it is of: those that a star import gives.
+PUBLIC = {vt.Interface: "interface", vt.Film: "film", vt.Medium: "medium", vt.Diffuse: "diffuse base"}
+PUBLIC |= {vt.Texture: "texture", vt.Spectrum: "spectrum", vt.Substance: "substance", vt.Pigment: "pigment"}
+PUBLIC |= {vt.Stack: "stack", vt.Mix: "mixture", vt.Model: "model", vt.Axis: "axis", vt.Space: "space"}
 
 
 @pytest.mark.parametrize("name", RESULTS)
@@ -58,6 +72,13 @@ def test_every_result_is_printed_in_a_few_lines(name: str) -> None:
     text = repr(RESULTS[name]())
     assert 0 < len(text.splitlines()) <= LINES
     assert len(text) < 5000
+
+
+def test_every_public_class_is_printed_here() -> None:
+    public = {getattr(vt, name) for name in vt.__all__}
+    classes = {each for each in public if isinstance(each, type) and not issubclass(each, Exception)}
+    assert set(PUBLIC) == classes
+    assert all(isinstance(RESULTS[name](), each) for each, name in PUBLIC.items())
 
 
 @pytest.mark.parametrize("name", ["coat", "imported", "bake", "lobes", "fit"])

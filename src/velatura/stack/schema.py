@@ -10,7 +10,7 @@ from __future__ import annotations
 import difflib
 import functools
 import itertools
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar, Generic, TypeVar
@@ -18,7 +18,7 @@ from typing import TYPE_CHECKING, Any, ClassVar, Generic, TypeVar
 from pydantic import BaseModel, ConfigDict, ValidationError
 from pydantic_core import CoreSchema, core_schema
 
-from velatura.errors import InvalidInput
+from velatura.errors import InvalidInput, short
 
 RecordType = TypeVar("RecordType", bound="Record")
 Given = TypeVar("Given", contravariant=True)
@@ -105,6 +105,15 @@ def by_default(value: Any) -> Any:
     return value
 
 
+LONGEST_REPR = 4_000  # characters of a field
+
+
+class _Written(str):
+    """A text that is its own repr."""
+
+    __repr__ = str.__str__
+
+
 class Record(BaseModel):
     """A frozen model whose fields are declared parameters; its errors are InvalidInput, in one line.
 
@@ -130,6 +139,11 @@ class Record(BaseModel):
 
     def __delattr__(self, key: str) -> None:
         raise InvalidInput(f"{key}: a {type(self).__name__} is never changed; make another one without that value")
+
+    def __repr_args__(self) -> Iterator[tuple[str | None, Any]]:
+        """Fields and values, of long ones their ends: a table of a spectrum would fill screens."""
+        for key, value in super().__repr_args__():
+            yield key, _Written(short(repr(value), LONGEST_REPR))
 
     @classmethod
     def from_dict(cls: type[RecordType], fields: Any) -> RecordType:
