@@ -62,7 +62,7 @@ RESULTS: dict[str, Callable[[], Any]] = {
     "space": lambda: vt.Space(material=mixture(), vary={"part0_layer0_alpha": {"range": [0.1, 0.5], "steps": 3}}),
 }
 #: Of `RESULTS`, by the class that it is of: those that a star import gives.
-PUBLIC = {vt.Interface: "interface", vt.Film: "film", vt.Medium: "medium", vt.Diffuse: "diffuse base"}
+PUBLIC: dict[type, str] = {vt.Interface: "interface", vt.Film: "film", vt.Medium: "medium", vt.Diffuse: "diffuse base"}
 PUBLIC |= {vt.Texture: "texture", vt.Spectrum: "spectrum", vt.Substance: "substance", vt.Pigment: "pigment"}
 PUBLIC |= {vt.Stack: "stack", vt.Mix: "mixture", vt.Model: "model", vt.Axis: "axis", vt.Space: "space"}
 
