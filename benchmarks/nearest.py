@@ -6,7 +6,9 @@ Random stacks of the inverse are wished to have a lobe of other energy or blur; 
 much other blur, and those that are met do not count. Answers at rest and by `invert` must agree in energies and
 roughnesses, and the bound under the hand must lie within 2 % of the way of that at rest. Beside each answer at rest
 that does not meet its wish, stacks are drawn within the bounds, by their coordinates: none that lies near the line to
-the wish may lead to one on the line that is nearer by 2 %. Times are of the processor.
+the wish may lead to one on the line that is nearer by 2 %. A model that reads one stack at a time reads few of them:
+those that the nearest model in closed form, scaled to read the answer alike, sees within `WIDER` times those margins,
+and of these the `READ` furthest. Times are of the processor.
 """
 
 from __future__ import annotations
@@ -21,7 +23,7 @@ from inverse import physical_targets
 from rows import parsed, row
 
 from velatura.inverse import Infeasible, Target, invert, invert_stack
-from velatura.inverse.local.coordinates import Point, units
+from velatura.inverse.local.coordinates import SLACK, Point, Space, units
 from velatura.inverse.local.dragged import DraggedStack
 from velatura.inverse.local.line import Line
 from velatura.inverse.nearest import READINGS, Nearest, nearest
@@ -30,6 +32,7 @@ from velatura.model.variance import Roughness
 
 SAME, NEARER, BESIDE, ON_LINE = 2e-3, 0.02, 0.01, 1e-3  # differences of lobes, shares of the way, and of readings
 FOLLOWED = 3  # stacks near the line that lead on, at most
+WIDER, READ = 4.0, 40  # of margins for stacks that are known roughly, and the most of these that a slow model reads
 CHANGE, BEYOND = 1.5, 3.0  # of wishes: the most, as a logarithm
 BRIGHTEST, ROUGHEST = 0.95, 0.9
 SPREAD = (1e-3, 1.0)  # of stacks that are drawn, in units of coordinates
@@ -77,14 +80,29 @@ def nearer(present: DraggedStack, answer: Nearest, count: int, rng: np.random.Ge
     spread = np.exp(rng.uniform(*np.log(SPREAD), (1, count))) * units(x)[:, None]
     points = np.clip(x[:, None] + spread * rng.normal(size=(len(x), count)), *(end[:, None] for end in space.box))
     points[held] = x[held, None]
-    points = points[:, [space.broken(point, None) is None for point in points.T]]
+    points = points[:, space.margins(space.bounds, points).min(axis=0) >= -SLACK]
     line = Line(present.point, space.goal(present.now(answer.wish)), space.goal(answer.wish), held, caps)
-    part, off = np.transpose([line.placed(reading) for reading in space.read(points).T])
-    ahead = np.flatnonzero((off < BESIDE) & (part > answer.part + NEARER))
-    ends = []
-    for n in ahead[np.argsort(-part[ahead])][:FOLLOWED]:
-        ends.append(dataclasses.replace(line, start=Point(space, points[:, n])).last(READINGS[False]))
+
+    def ahead(readings: np.ndarray, wider: float, most: int) -> np.ndarray:
+        part, off = np.transpose([line.placed(reading) for reading in readings.T])
+        near = np.flatnonzero((off < wider * BESIDE) & (part > answer.part + NEARER / wider))
+        return near[np.argsort(-part[near])][:most]
+
+    if space.slow:
+        points = points[:, ahead(roughly(space, x).read(points), WIDER, READ)]
+    if not points.size:
+        return 0.0
+    starts = points[:, ahead(space.read(points), 1.0, FOLLOWED)]
+    ends = [dataclasses.replace(line, start=Point(space, start)).last(READINGS[False]) for start in starts.T]
     return max((end.part for end in ends if end.off < ON_LINE), default=0.0)
+
+
+def roughly(space: Space, x: np.ndarray) -> Space:
+    """The space as the nearest model in closed form reads it, scaled to read a point as the model itself does."""
+    value, near = (each.read(x[:, None])[:, 0] for each in (space, space.quickly))
+    alike = value * near > 0
+    factors = np.where(alike, value / np.where(alike, near, 1.0), 1.0)
+    return dataclasses.replace(space.quickly, factors=factors)
 
 
 def main() -> int:
