@@ -5,7 +5,8 @@
 Exactness is a round trip: random targets of one to three lobes, those that have a stack, are inverted, written as
 materials, and read by `vt.lobes`. For a model without a closed form they are those of the nearest model that has one;
 which of these it refuses is counted. Lobes that `velatura` reads of random stacks are targets, too, of which
-none may be refused; so are those of rough interfaces (`--parts rough`). Times are the best of several runs.
+none may be refused; so are those of rough interfaces (`--parts rough`), and those of the paper's figures
+(`--parts figures`). Times are the best of several runs.
 """
 
 from __future__ import annotations
@@ -16,10 +17,12 @@ import time
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field, replace
+from functools import partial
 
 import numpy as np
 from rows import parsed, row
 
+from velatura.figures.bati2021_targets import FIGURES
 from velatura.inverse import Above, Choice, EquivalenceClass, Target, invert, invert_stack
 from velatura.inverse.lobes import equivalence, interface, pair
 from velatura.inverse.lobes.partial_stack import Array, Layers, join, take
@@ -48,7 +51,7 @@ SETS: tuple[tuple[str, str, dict[str, bool]], ...] = (
     ("rough", "stacks of rough interfaces", {"rough": True}),
     ("films", "stacks with films", {"coated": True}),
 )
-PARTS = ("physical", "rough", "films", "exactness", "narrow", "speed")
+PARTS = ("physical", "rough", "films", "exactness", "narrow", "speed", "figures")
 
 #: One to three lobes: of one interface or a pair, the last one dielectric or a metal.
 KINDS = (
@@ -325,14 +328,20 @@ def narrow(count: int = 60, seed: int = 0) -> list[tuple[float, bool]]:
 # Speed ---------------------------------------------------------------------------------------------------------------
 
 
-def best(function: Callable[[], object], runs: int) -> float:
+def best(function: Callable[[], object], runs: int, clock: Callable[[], float] = time.perf_counter) -> float:
     """Seconds of the quickest run."""
     times = []
     for _ in range(runs):
-        start = time.perf_counter()
+        start = clock()
         function()
-        times.append(time.perf_counter() - start)
+        times.append(clock() - start)
     return min(times)
+
+
+def figures(model: Model) -> dict[str, float]:
+    """Seconds of processor time for the lobes of every target of the paper's figures."""
+    targets = {name: Target(lobes) for name, lobes in FIGURES.items()}
+    return {name: best(partial(invert.search, target, model), 3, time.process_time) for name, target in targets.items()}
 
 
 def configuration() -> float:
@@ -404,6 +413,11 @@ def main() -> int:
         for exponent in range(-8, -1):
             own = [seen for size, seen in sets if 10.0**exponent <= size < 10.0 ** (exponent + 1)]
             print(f"sets of 1e{exponent} to 1e{exponent + 1} of the index: {sum(own)} of {len(own)} found")
+
+    for model in given or [named(DEFAULT)] if "figures" in parts else ():
+        taken = figures(model)
+        slowest = max(taken, key=lambda name: taken[name])
+        row("figures", f"targets, {model.name}", [*taken.values()], remark=f"{slowest} takes {taken[slowest]:.3f} s")
 
     if "speed" in parts:
         print(f"load when times are taken: {os.getloadavg()[0]:.1f} on {os.cpu_count()} cores")
