@@ -485,7 +485,7 @@ def test_a_coloured_wish_for_one_interface_snaps_to_grey() -> None:
     wish["lobes"][0]["energy"] = [0.12, 0.1, 0.1]
     answer = appearance.invert({"target": wish, "material": state["material"], "model": "bati2021"})
     assert answer["target"]["lobes"][0]["energy"] == pytest.approx([0.32 / 3] * 3)
-    assert answer["snapped"].startswith("lobe 1: what lies above it absorbs nothing")
+    assert answer["snapped"].startswith("lobe 1: nothing above it absorbs")
 
 
 def test_other_interfaces_or_base_give_a_fresh_stack() -> None:
@@ -666,7 +666,7 @@ def test_a_part_of_the_way_ends_on_the_bound_that_is_named(
 @pytest.mark.parametrize(
     ("lobe", "energy", "says"),
     [
-        ({"energy": [0.08, 0.04, 0.05]}, [0.0567] * 3, "lobe 1: what lies above it absorbs nothing"),
+        ({"energy": [0.08, 0.04, 0.05]}, [0.0567] * 3, "lobe 1: nothing above it absorbs"),
         ({"energy": [0.95, 0.75, 0.35], "alpha": 0.4, "base": "conductor"}, [0.7849, 0.75, 0.35], "lobe 1: not even"),
         ({"energy": [0.5, 0.1, 0.1], "base": "conductor"}, [0.5, 0.1716, 0.1716], "lobe 1: a conductor"),
         ({"energy": 0.6, "interfaces": 2}, [0.529] * 3, "lobe 1: no index up to 4"),

@@ -25,7 +25,7 @@ EFFORT = EFFORTS[:1]  # to find a stack that is not near
 # Readings of a slow model, of one line: at rest and under the hand; and where slopes are measured
 READINGS, LONG_READINGS = (10, 8), (26, 16)
 QUICK = 2e-3  # by which an answer under the hand may miss its place on the line, in units of readings
-ON_LINE, QUICKLY_ON_LINE = 1e-3, 2e-2  # what an answer may miss the line by
+ON_LINE, QUICKLY_ON_LINE = 1e-3, 5e-3  # what an answer may miss the line by
 SAME = 1e-5  # difference of roughnesses of a blur that stays
 CLOSE = 0.05  # part of the way from which a wish is met by itself
 UNLIKE = 1e-3  # energy or variance by which a stack differs from the nearest that can be dragged, and is taken itself

@@ -16,7 +16,8 @@ REASONS = {
     "upper": "its upper interface alone reflects more",
     "absorption": "the fixed index reflects too little",
     "excess": "the fixed index reflects more, and what lies above it absorbs nothing, or what is fixed",
-    "colour": "what lies above it absorbs nothing, or what is fixed, and one index does not give that colour",
+    "colour": "no index, and nothing that may absorb above it, gives that colour",
+    "grey": "nothing above it absorbs, so that it must be grey",
     "mirror": "nothing above this mirror absorbs, so that it reflects all light",
     "metal": f"a conductor (k >= eta) reflects more, {CONDUCTOR_MIN:.3f} at least, and what lies above absorbs nothing",
     "blur": "what lies above it blurs light more than that, or bounces it too often",
@@ -80,5 +81,9 @@ class Infeasible(NoSolution):
 
 
 def because(lobe: int, constraint: str, target: Target) -> str:
-    """The reason in words."""
+    """The reason in words; that for a colour depends on whether a medium can give it."""
+    own = target.lobes[lobe]
+    on_top = lobe == 0 and own.interfaces == 1 and own.base == "dielectric"
+    if constraint == "colour" and on_top and own.fixed.of("tau", 0) is None:
+        constraint = "grey"
     return f"lobe {lobe + 1}: {REASONS[constraint].format(eta_max=target.eta_max)}"
