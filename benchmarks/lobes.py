@@ -82,15 +82,18 @@ def modelled(stack: Stack, cosines: Array, azimuth: float, often: bool) -> Array
     albedos = (solved.lobes.sum(axis=0) + solved.veils.sum(axis=0) + solved.rest)[:, len(cosines) :]
     polynomial, _ = remainder.fit(solved.nodes, solved.remainder, INCIDENCES, np.broadcast_to(albedos, (len(rest), 8)))
     by_colour = Remainder(*(np.reshape(number, (-1, 1)) for number in vars(polynomial).values()))
-    tensors = widths.tensors(found, cosines, phi, lobes.mean(axis=1))
+    known = widths.each(found, cosines, phi, lobes.mean(axis=1))
 
     wo, cell = over_the_disc()
     light = np.zeros((3, len(cosines), BINS, BINS))
     for i, cosine in enumerate(cosines):
         sine = float(np.sqrt(1 - cosine**2))
         wi = sine * float(np.cos(azimuth)), sine * float(np.sin(azimuth)), float(cosine)
-        for k, tensor in enumerate(tensors):
-            for shape, energy in ((tensor, lobes[k, :, i]), (widths.veil(found, k, cosines, tensor), veils[k, :, i])):
+        for k, (tensor, near, tail) in enumerate(known):
+            lit = [(near, lobes[k, :, i]), (widths.veil(found, k, cosines, tensor), veils[k, :, i])]
+            if tail:
+                lit = [(near, (1 - tail.share[i]) * lit[0][1]), (tail.tensor, tail.share[i] * lit[0][1]), lit[1]]
+            for shape, energy in lit:
                 if energy.max() > 1e-6:
                     roughness = Roughness(*(float(x[i]) for x in shape.roughness(phi)))
                     light[:, i] += energy[:, None, None] * of_lobe(lobe_of(facets, k, roughness), wi)
@@ -107,7 +110,8 @@ def lobe_of(facets: Sequence[Facets], k: int, roughness: Roughness) -> Refracted
 
     def leaving(cosine: Array) -> Array:
         assert first is not None
-        above = np.sqrt(np.maximum(1 - (1 - cosine * cosine) / np.mean(facets[first].above) ** 2, 0))
+        cos2 = np.maximum(1 - (1 - cosine * cosine) / np.mean(facets[first].above) ** 2, 0)
+        above = np.sqrt(cos2 + widths.steeper(facets[first].alpha_u, facets[first].alpha_v) * (1 - cos2))
         return np.asarray(1 - facets[first].reflectance(above).mean(axis=0))
 
     first = widths.first_step([each.step for each in facets[:k]])

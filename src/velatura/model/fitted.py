@@ -19,6 +19,9 @@ STRAIGHT_STEP = {True: 0.04, False: 0.01}
 UNDISTURBED = 0.5  # steps of the logarithm of the index, over which light of repeated facets loses the shape of a lobe
 AGAIN = 1.0  # of light of repeated facets beside that of single ones, that has the shape of a lobe at most
 AGAIN_POWER = 4.0  # of that minimum
+# Share of the light of repeated facets without a lobe which that of a metal takes, for brushed dielectrics inside other
+# media, and steps of the logarithm of their index below which that fades
+ALONG, ALONG_FADE = 2.5, 0.02
 
 # Widths (lobes.py) ---------------------------------------------------------------------------------------------------
 
@@ -26,6 +29,7 @@ Q = 1.52  # powers of which widths add; between Cauchy (1) and Gauss (2), as the
 # How cosines grow with roughness, in the plane and across it: of the interfaces above, and of the lobe's own
 STEEPNESS = (9.0, 1.2)
 OWN_STEEPNESS = (0.53, 1.5)
+LEAVING_STEEPNESS = 3.0  # likewise of the cosine at which light that leaves meets brushed facets
 SLIGHT_STEP = 0.2  # step of the index over the greatest one, that does not count
 CORRECTION_MAX = 1.5  # logarithm of a correction
 CORRECTION_FADE = 0.1  # sum of steps of the logarithm of the index below which corrections fade
@@ -66,6 +70,13 @@ BRUSHED_CORRECTION: tuple[tuple[tuple[str, str], float], ...] = (
 )
 # Powers by which that fades where coats make the width along an axis, and by which lobes turn with the plane there
 COATS_MAKE = 8, 3
+
+# Lobes that are parted below crossed facets: from where on; how the logarithm of a width along an axis changes, that of
+# what lies near the mirror direction, and of the tail along the facets of its own interface; log-odds of the tail
+CROSSING, CROSSING_FADE = 0.08, 0.02
+NEAR: dict[str, float] = {"1": -0.155, "coats": 0.232, "slant": -0.102}
+TAIL: dict[str, float] = {"1": 0.78, "coats": -1.01, "slant": 0.6, "slanted coats": -0.29}
+TAIL_ODDS: dict[str, float] = {"1": -1.421, "slant": -0.263, "brighter": 0.808}
 
 # Light that passes (fidelity.py) -------------------------------------------------------------------------------------
 

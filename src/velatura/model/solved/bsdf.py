@@ -53,13 +53,15 @@ ROOTS = _Roots(lambda along, across: ops.sqrt(along), lambda along, across: alon
 @dataclass(frozen=True)
 class Shape:
     """A lobe but for its columns: number of its interface, index of its medium, the facets that it is of, and what
-    lets it out, with the index above that."""
+    lets it out, with the index above that. Brushed facets let light out that they face: its cosine there is `steeper`,
+    by a share of sin^2; None for others."""
 
     interface: int
     n: MediumIndex
     facets: SmoothInterface | None
     n_first: MediumIndex
     first: SmoothInterface | None
+    steeper: Value | None = None
 
     def lobe(self, weight: Value, roughness: Roughness) -> RefractedLobe:
         reflect = self.facets.reflect_together if self.facets else None
@@ -70,6 +72,8 @@ class Shape:
         n, cos2 = self.n_first, cosine * cosine
         if not n.is_outside:
             cos2 = ops.maximum((n.ring2 + cos2) * (n.inverse * n.inverse), 0.0)
+        if self.steeper is not None:
+            cos2 = cos2 + self.steeper * (1 - cos2)
         return self.first.pass_together(cos2)
 
 
@@ -451,9 +455,10 @@ def _either(where: Value, a: Shape, b: Shape) -> Shape:
     if a.first is None and b.first is None:
         return Shape(a.interface, ops.select_record(where, a.n, b.n), facets, a.n_first, None)
     first = _of_either(where, a.first, b.first)
-    return Shape(
-        a.interface, ops.select_record(where, a.n, b.n), facets, ops.select_record(where, a.n_first, b.n_first), first
-    )
+    n, n_first = ops.select_record(where, a.n, b.n), ops.select_record(where, a.n_first, b.n_first)
+    ends = [0.0 if each.steeper is None else each.steeper for each in (a, b)]
+    steeper = None if a.steeper is b.steeper is None else ops.select(where, *ends)
+    return Shape(a.interface, n, facets, n_first, first, steeper)
 
 
 def _of_either(where: Value, a: SmoothInterface | None, b: SmoothInterface | None) -> SmoothInterface:

@@ -16,7 +16,7 @@ from velatura import ops
 from velatura.media import of_material
 from velatura.model.base import Model
 from velatura.model.context import Context, channels
-from velatura.model.smooth_interface import SmoothInterface, smooth_interfaces
+from velatura.model.smooth_interface import smooth_interfaces
 from velatura.model.solved import reciprocal_balance, sample_allocation, wide_light
 from velatura.model.solved.bsdf import ROOTS, Shape, Side, SideView, Solved
 from velatura.model.solved.columns import Columns, Declaration
@@ -37,7 +37,7 @@ from velatura.model.solved.transmission import combined, direct, internal_reflec
 from velatura.model.solved.transmission.combined import Parts
 from velatura.model.solved.transmission.direct import Transmission
 from velatura.model.solved.transmission.internal_reflections import Rest
-from velatura.model.variance import Covariance, Isotropic, PerAxis, Roughness, Variance
+from velatura.model.variance import Covariance, Isotropic, PerAxis, Roughness, Variance, is_same
 from velatura.ops import Value
 from velatura.optics.ggx import Direction
 from velatura.optics.phase import HenyeyGreenstein, PhaseFunction
@@ -68,14 +68,15 @@ MIN_DEFENSIVE_SHARE = 0.2  # of samples of the symmetric form, that the remainde
 @dataclass(frozen=True)
 class LobeSpec:
     """A lobe: the number of its interface from the top, that of the one that shapes its light on the way out, None
-    where none does, whether it is the veil of one, whether its medium is nowhere of a lower index than outside, and
-    whether its light has an edge: for want of that, where what lets it out passes light of any momentum in the medium,
-    or nearly, where the indices are about the same.
+    where none does, whether it is the veil of one, or the tail of one below crossed facets, whether its medium is
+    nowhere of a lower index than outside, and whether its light has an edge: for want of that, where what lets it out
+    passes light of any momentum in the medium, or nearly, where the indices are about the same.
     """
 
     interface: int
     first: int | None
     veil: bool
+    tail: bool
     denser: bool
     edged: bool
 
@@ -169,10 +170,11 @@ class Lit:
 
 
 class _Lobe(NamedTuple):
-    """A lobe that is drawn, and its width at the directions of a grid."""
+    """A lobe that is drawn, and its width at the directions of a grid, with its share of the light of such lobes."""
 
     shape: Shape
     tensor: Tensor
+    share: Array
 
 
 @dataclass(frozen=True)
@@ -320,7 +322,7 @@ class Solver:
         """A side of a material of a renderer's values, those of one point or of all; `numbers` are colours in the order
         of `SolvedSide.numbers`."""
         assert context.colour is not None
-        shapes = tuple(shapes_of(smooth_interfaces(material), layout.lobes))
+        shapes = tuple(shapes_of(material, layout.lobes))
         each = iter(numbers)
         polynomial = _polynomial(each)
         top = self.medium(TopMedium, material, layout, _shares(each)) if layout.apart else None
@@ -371,7 +373,8 @@ class Solver:
         lobes = self._lobes(material, layout, folded, light)
         clipped, peak = _clipped(diffuse, folded.at_cosines)
         whole = diffuse.polynomial.albedo(folded.cosine) + folded.around(clipped)
-        drawn, rest = self._hand_over(_in_veils(layout, material, light), folded, lobes, light.rest, whole)
+        own = [lobe.share * energy for lobe, energy in zip(lobes, _in_veils(layout, material, light))]
+        drawn, rest = self._hand_over(own, folded, lobes, light.rest, whole)
         scale = _scale(rest, whole)
         wanted = [*(each.wanted for each in drawn), Demand.of(rest + ENERGY_EPS, rest, scale * folded.around(peak))]
         transmission = self.transmission(_uncoloured(material), layout)
@@ -444,16 +447,21 @@ class Solver:
         return first, diffuse, _Diffuse.fitted(*seen, *passed, medium, through, cosines)
 
     def _lobes(self, material: Material, layout: Layout, folded: Folded | Listed, light: Energies) -> list[_Lobe]:
-        """Work out the widths of lobes and veils."""
+        """Work out the widths of lobes, veils and tails."""
         found, energy = parts(material), np.array([ops.mean(each) for each in light.lobes])
-        tensors = widths.tensors(found, folded.cosine, folded.phi, energy)
+        known = widths.each(found, folded.cosine, folded.phi, energy)
+        whole = np.ones_like(folded.cosine)
 
-        def tensor(spec: LobeSpec) -> Tensor:
-            own = tensors[spec.interface]
-            return widths.veil(found, spec.interface, folded.cosine, own) if spec.veil else own
+        def width(spec: LobeSpec) -> tuple[Tensor, Array]:
+            tensor, near, tail = known[spec.interface]
+            if spec.veil:
+                return widths.veil(found, spec.interface, folded.cosine, tensor), whole
+            if spec.tail:
+                return tail or (tensor, 0 * whole)
+            return near, 1 - tail.share if tail else whole
 
-        shapes = shapes_of(smooth_interfaces(_uncoloured(material)), layout.lobes)
-        return [_Lobe(shape, tensor(spec)) for shape, spec in zip(shapes, layout.lobes)]
+        shapes = shapes_of(_uncoloured(material), layout.lobes)
+        return [_Lobe(shape, *width(spec)) for shape, spec in zip(shapes, layout.lobes)]
 
     def _hand_over(
         self, energies: Sequence[Array], folded: Folded | Listed, lobes: Sequence[_Lobe], rest: Array, whole: Array
@@ -465,7 +473,7 @@ class Solver:
         short = np.clip(rest - BRIGHTEST * whole, 0, of_lobes)
         rest, share = rest - short, 1 + ops.divide(short, of_lobes)
         normals = self.normals or (FINELY[1] if self.finely else round(_share(len(lobes)) * NORMALS[self.isotropic]))
-        for (shape, tensor), own in zip(lobes, energies):
+        for (shape, tensor, _), own in zip(lobes, energies):
             lobe = shape.lobe(1.0, tensor.roughness(folded.phi))
             z, squares, largest = refracted_lobe.integrals(lobe, folded.directions, normals)
             more = np.clip(share * own - combined.MAX_GAIN * z, 0, np.maximum(BRIGHTER * whole - rest, 0))
@@ -498,7 +506,7 @@ class Solver:
             # What passes is sampled with the facets that reflect
             facets = wanted[0]
             reflected = Demand(*(np.concatenate([0 * x[:1], x[1:]]) for x in reflected))
-        met = [*(None if each.veil else each.interface for each in layout.lobes), None]
+        met = [*(None if each.veil or each.tail else each.interface for each in layout.lobes), None]
         whole = None
         if through:
             gained, peak = map(folded.around, _clipped(through, folded.at_cosines))
@@ -523,7 +531,7 @@ class Solver:
     def _edged(self, material: Material, lobes: Sequence[_Lobe], phi: Array) -> list[Shape | None]:
         """Lobes whose integrals have edges between directions; those are lost in the error of few normals."""
         sharp = self.normals is None and _reflects_all(parts(material))
-        return [shape if sharp and np.min(tensor.roughness(phi)[:2]) < NARROW else None for shape, tensor in lobes]
+        return [shape if sharp and np.min(tensor.roughness(phi)[:2]) < NARROW else None for shape, tensor, _ in lobes]
 
     def spread(self, side: SolvedSide) -> Array:
         """All columns of a side over a renderer's grid, (rows, prod(shape)). The remainder of the forward form has its
@@ -696,14 +704,17 @@ def layout_of(materials: Sequence[Material], veiled: Set[int] = frozenset()) -> 
     each = [interfaces(parts(material)) for material in materials]
     steps = np.max([[facets.step for facets in found] for found in each], axis=0)
     turns = np.max([[facets.step * max(facets.alpha_u, facets.alpha_v) for facets in found] for found in each], axis=0)
-    both = [(k, veil) for k in range(len(steps)) for veil in (False, True) if not veil or k in veiled]
+    kinds = [(k, veil, False) for k in range(len(steps)) for veil in (False, True) if not veil or k in veiled]
+    kinds += [(len(steps) - 1, False, True)] if any(map(widths.crossing, filter(None, each))) else []
     rough = widths.stepped(turns, widths.LEAST_TURN)
     above = np.array([[np.mean(facets.above) / np.mean(found[0].above) for facets in found] for found in each])
     denser = np.all(above >= 1, axis=0).tolist()
     firsts = [widths.first_step(steps[:k]) for k in range(len(steps))]
     edged = [k is not None and bool(np.any(above[:, k + 1] > own * CLOSE)) for k, own in zip(firsts, above.T)]
     near = np.any((1 - RELATIVE) * above < 1, axis=0).tolist()
-    lobes = [LobeSpec(k, firsts[k], veil, denser[k], (near if denser[k] else edged)[k]) for k, veil in both]
+    lobes = [
+        LobeSpec(k, firsts[k], veil, tail, denser[k], (near if denser[k] else edged)[k]) for k, veil, tail in kinds
+    ]
     cloudy = sorted(set().union(*map(_cloudy, materials)))
     stepped = widths.stepped(steps)
     last, top = rough[-1] if rough else None, _top(materials, stepped)
@@ -856,16 +867,18 @@ def _evenly(of: Parts, least: float) -> Parts:
     return replace(of, of_straight=straight, of_bounced=bounced, of_rest=of.share - straight - bounced)
 
 
-def shapes_of(found: Sequence[SmoothInterface], drawn: Sequence[LobeSpec]) -> list[Shape]:
+def shapes_of(material: Material, drawn: Sequence[LobeSpec]) -> list[Shape]:
     """One for each lobe."""
-    indices = [MediumIndex.of(1.0)]
+    found, indices = smooth_interfaces(material), [MediumIndex.of(1.0)]
     for layer in found:
         indices.append(MediumIndex.of(indices[-1].n * layer.n12))
+    alphas = [(layer.alpha_u, layer.alpha_v) for layer in material.interfaces]
+    steeper = [None if is_same(u, v) else widths.steeper(u, v) for u, v in alphas]
     shapes = []
     for lobe in drawn:
         own, k = found[lobe.interface], lobe.first
         facets = own if k is None or not own.opaque else None
-        out = (indices[0], None) if k is None else (indices[k], found[k])
+        out = (indices[0], None) if k is None else (indices[k], found[k], steeper[k])
         n = replace(indices[lobe.interface], denser=lobe.denser, edged=lobe.edged)
         shapes.append(Shape(lobe.interface, n, facets, *out))
     return shapes

@@ -12,7 +12,6 @@ from velatura.model.base import Model
 from velatura.model.lobe_statistics import LobeStatistics, StackLobes, nearer_axis, with_axes_named
 from velatura.model.rough_interface import Facets
 from velatura.model.roughness_maps import MAPS
-from velatura.model.smooth_interface import smooth_interfaces
 from velatura.model.solved import equivalent_roughness
 from velatura.model.solved.bsdf import Shape
 from velatura.model.solved.energies.adding import Part, parts
@@ -65,7 +64,7 @@ def solved_lobes(material: Material, model: Model, wi: Direction) -> StackLobes:
 
     layout = layout_of([material])
     facets = [place for place, part in enumerate(found) if isinstance(part, Facets)]
-    drawn = shapes_of(smooth_interfaces(material), layout.lobes)
+    drawn = shapes_of(material, layout.lobes)
     tensors = widths.tensors(found, cos_theta, phi, solved.lobes.mean(axis=1)) if facets else []
     reflected = []
     for k, (place, shape, tensor) in enumerate(zip(facets, drawn, tensors)):

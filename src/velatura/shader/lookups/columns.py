@@ -48,6 +48,7 @@ OF_TOP = 4  # numbers of a medium on top
 FAINTLY = 1e-3  # chance that is added to that of every reflected part, where some are shown alone
 NORMAL = (0.0, 0.0, 1.0)
 COARSE = 12, 144  # cosines, and normals
+BRUSHED = 0.3, 0.1  # roughnesses of interfaces that cross
 SCATTERING = 1.0, 0.9  # optical depth and asymmetry of media below which veils are seen
 
 Array = NDArray[np.floating]
@@ -169,7 +170,7 @@ def tabulated(stack: Stack, material: Material, model: Model, variance: type[Var
         material = material.each(lambda address, x: x - by if address.key == "rotation" else x)
     solver = Solver.of(model, variance, Context(), None if general else plain)
     solver = replace(solver, phase_of=_of_numbers if general else _printed)
-    layouts = solver.layouts([_eventful(plain) if general else plain])
+    layouts = solver.layouts([_eventful(plain, material) if general else plain])
     if general and layouts[0].apart and solve.has_one_medium(plain):
         layouts = [replace(layout, alone=True) for layout in layouts]
     may_be_wide = general and _may_be_wide(plain, layouts[0], variance)
@@ -385,14 +386,23 @@ def _colours(side: SolvedSide) -> Array:
     return side.numbers.reshape(-1, side.polynomial.c_00.shape[-1])
 
 
-def _eventful(material: Material) -> Material:
-    """A material that draws all that layers like these may have: media scatter, and all indices differ."""
+def _eventful(material: Material, written: Material) -> Material:
+    """A material that draws all that layers like those that are `written` may have: media scatter, all indices differ,
+    and brushed interfaces cross."""
     depth, g = SCATTERING
 
     def eventful(k: int, layer: Any) -> Any:
         if isinstance(layer, MediumValues):
             return replace(layer, depth=depth, sigma_s=np.ones((3, 1)), g=g, phase=None)
-        dielectric = isinstance(layer, InterfaceValues) and layer.kind == "dielectric"
-        return replace(layer, eta=material.exterior * (1.5 + 0.1 * k)) if dielectric else layer
+        if not isinstance(layer, InterfaceValues):
+            return layer
+        seen = written.layers[k]
+        assert isinstance(seen, InterfaceValues)
+        if not is_same(seen.alpha_u, seen.alpha_v):
+            u, v = (BRUSHED, BRUSHED[::-1])[len(found) % 2]
+            layer = replace(layer, alpha_u=u, alpha_v=v, rotation=0.0)
+            found.append(k)
+        return replace(layer, eta=material.exterior * (1.5 + 0.1 * k)) if layer.kind == "dielectric" else layer
 
+    found: list[int] = []
     return replace(material, layers=tuple(eventful(k, layer) for k, layer in enumerate(material.layers)))

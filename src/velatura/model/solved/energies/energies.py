@@ -145,6 +145,9 @@ def energies(
     share = np.minimum(reflected / np.maximum(veiled.sum(axis=0), TINY), 1)
     lobes, veils = unscattered * share, np.maximum(veiled - unscattered, 0) * share
     rest = np.maximum(reflected - (lobes + veils).sum(axis=0), 0)
+    if brushed and (along := _along(everything)) > 0:
+        handed = along * np.clip(of_whole.sum(axis=0) - unscattered.sum(axis=0), 0, rest)
+        lobes[-1], rest = lobes[-1] + handed, rest - handed
     lobes, veils, rest = colours.parts_seen(lobes, veils, rest)
     count = np.size(cos_theta)
     if brushed and len(incidences):
@@ -199,6 +202,20 @@ def _undisturbed(found: Sequence[Part]) -> dict[int, float]:
             shares[i] = float(np.exp(-steps / fitted.UNDISTURBED)) * (part.brushed if part.is_exit else 1.0)
             steps += part.step
     return shares
+
+
+def _along(found: Sequence[Part]) -> float:
+    """Share of the light of repeated facets in no lobe that the lobe of a metal has, since the remainder has no axes:
+    that which brushed facets of little step block, inside other media, leaves much as the rest of the lobe does."""
+    facets = [part for part in found if isinstance(part, Facets)]
+    *coats, last = facets
+    if not last.opaque or not coats:
+        return 0.0
+    blocked = np.array([coat.brushed * (coat.alpha_u**2 + coat.alpha_v**2) for coat in coats])
+    steps = np.array([coat.step for coat in coats])
+    onward = np.exp(-steps / fitted.UNDISTURBED) * steps / (steps + fitted.ALONG_FADE)
+    share = float((blocked * onward)[1:].sum() / max(blocked.sum(), TINY))
+    return min(fitted.ALONG * last.brushed * share, 1.0)
 
 
 def _taken(share: Array, again: Array, once: Array) -> Array:

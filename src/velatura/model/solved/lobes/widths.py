@@ -21,8 +21,9 @@ Values are NumPy's, for directions (M,).
 from __future__ import annotations
 
 import functools
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -47,6 +48,7 @@ NEARLY_STRAIGHT = 0.2  # radians; by how much light of a veil is turned at most,
 SHARE_MIN = HenyeyGreenstein(0.05).within(NEARLY_STRAIGHT)  # of media that have a veil
 HALVINGS = 30  # of an angle, to a part of 10^9
 COARSE = 144  # normals
+MOST_PARTED = 2.0  # logarithm of the change of a width where a lobe is parted
 AXES = (0.0, 0.5 * np.pi)  # of a tensor
 LEAST_STEP = 0.02  # of the logarithm of the index, that counts at all
 LEAST_TURN = 1e-3  # step times alpha, of facets that turn light
@@ -189,15 +191,35 @@ def first_step(steps: Sequence[float]) -> int | None:
     return next(iter(stepped(steps)), None)
 
 
+class Tail(NamedTuple):
+    """The part of a lobe that lies along the facets of its own interface, with its share of the light, (M,)."""
+
+    tensor: Tensor
+    share: Array
+
+
+class Width(NamedTuple):
+    """The roughness of a lobe, that of what its tail leaves of it, and the tail, None where its facets cross none."""
+
+    tensor: Tensor
+    near: Tensor
+    tail: Tail | None
+
+
 def tensors(found: Sequence[Part], cos_theta: Array, phi: Array, energies: Array) -> list[Tensor]:
-    """Roughness of the lobe of each interface in the medium above it, from the top, in the plane of incidence.
+    """Roughness of the lobe of each interface as a whole; arguments as `each`."""
+    return [width.tensor for width in each(found, cos_theta, phi, energies)]
+
+
+def each(found: Sequence[Part], cos_theta: Array, phi: Array, energies: Array) -> list[Width]:
+    """Widths of the lobe of each interface in the medium above it, from the top, in the plane of incidence.
 
     Args:
         found: the layers, as `energies.adding.parts` has them.
         cos_theta, phi: of the directions, (M,).
         energies: of the lobes (K, M), means over colours.
     """
-    result: list[Tensor] = []
+    result: list[Width] = []
     coats: list[_Coat] = []
     share = np.ones((1, len(cos_theta)))
     for part in found:
@@ -211,9 +233,9 @@ def tensors(found: Sequence[Part], cos_theta: Array, phi: Array, energies: Array
         if coats:
             first = _turned_aside(_first_order(own, coats, n, cosine), coats, n, cosine)
             seen = features(part, first, own, coats, cos_theta, share, energies[len(result)])
-            result.append(_corrected(first, seen))
+            result.append(_parted(_corrected(first, seen), own, seen, crossing([*(x.facets for x in coats), part])))
         else:
-            result.append(own)
+            result.append(Width(own, own, None))
         if not part.opaque:
             assert part.below is not None
             passed = part.passing(cosine)
@@ -318,6 +340,48 @@ def _corrected(first: Tensor, seen: dict[str, Array]) -> Tensor:
     u, v, x = (np.exp(np.clip(fading * each, -fitted.CORRECTION_MAX, fitted.CORRECTION_MAX)) for each in (*axes, apart))
     scaled = Tensor.turned(u * first.width(first.angle), v * first.width(first.angle + AXES[1]), first.angle)
     return scaled.stretched(x, 1 / x)
+
+
+def crossing(facets: Sequence[Facets]) -> float:
+    """How far the long facets of an opaque interface cross those of an interface above: from 0, for parallel ones,
+    isotropic ones and such as make no step of the index, to 1."""
+    *coats, last = facets
+    if not last.opaque:
+        return 0.0
+    along = [each.rotation + (each.alpha_v > each.alpha_u) * AXES[1] for each in facets]
+    across = (
+        coat.brushed * np.sin(angle - along[-1]) ** 2 * coat.step / (coat.step + fitted.CROSSING_FADE)
+        for coat, angle in zip(coats, along)
+    )
+    return float(-np.expm1(-last.brushed * max(across, default=0.0) / fitted.CROSSING))
+
+
+def _parted(tensor: Tensor, own: Tensor, seen: dict[str, Array], crossed: float) -> Width:
+    """A lobe of crossed facets as two: a sum of tails along different axes is no ellipse.
+
+    One step of momentum is that of a facet of the lobe's own interface, along its axes; smaller ones, of the interfaces
+    above, broaden what lies near the mirror direction more than the tail.
+    """
+    if not crossed:
+        return Width(tensor, tensor, None)
+
+    def scaled(angle: Array, numbers: Mapping[str, float]) -> Tensor:
+        axes = np.array([tensor.width(angle + turn) for turn in AXES])
+        coats = 1 - np.minimum(np.array([own.width(angle + turn) for turn in AXES]) / axes, 1) ** fitted.Q
+        by_axis = {**seen, "coats": coats, "slanted coats": seen["slant"] * coats}
+        change = crossed * sum(number * by_axis[name] for name, number in numbers.items())
+        return Tensor.turned(*(axes * np.exp(np.clip(change, -MOST_PARTED, MOST_PARTED))), angle)
+
+    near, tail = scaled(tensor.angle, fitted.NEAR), scaled(own.angle, fitted.TAIL)
+    share = crossed / (1 + np.exp(-sum(number * seen[name] for name, number in fitted.TAIL_ODDS.items())))
+    return Width(tensor, near, Tail(tail, share))
+
+
+def steeper(alpha_u: Value, alpha_v: Value) -> Value:
+    """Share of sin^2 by which the square of the cosine grows at which light that leaves meets brushed facets, in any
+    dialect."""
+    brushed = 1 - ops.divide(ops.minimum(alpha_u, alpha_v), ops.maximum(alpha_u, alpha_v))
+    return ops.minimum((0.5 * fitted.LEAVING_STEEPNESS) * brushed * (alpha_u * alpha_u + alpha_v * alpha_v), 1.0)
 
 
 def veil(found: Sequence[Part], k: int, cos_theta: Array, tensor: Tensor) -> Tensor:
