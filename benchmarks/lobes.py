@@ -82,14 +82,14 @@ def modelled(stack: Stack, cosines: Array, azimuth: float, often: bool) -> Array
     albedos = (solved.lobes.sum(axis=0) + solved.veils.sum(axis=0) + solved.rest)[:, len(cosines) :]
     polynomial, _ = remainder.fit(solved.nodes, solved.remainder, INCIDENCES, np.broadcast_to(albedos, (len(rest), 8)))
     by_colour = Remainder(*(np.reshape(number, (-1, 1)) for number in vars(polynomial).values()))
-    known = widths.each(found, cosines, phi, lobes.mean(axis=1))
+    each = widths.each(found, cosines, phi, lobes.mean(axis=1))
 
     wo, cell = over_the_disc()
     light = np.zeros((3, len(cosines), BINS, BINS))
     for i, cosine in enumerate(cosines):
         sine = float(np.sqrt(1 - cosine**2))
         wi = sine * float(np.cos(azimuth)), sine * float(np.sin(azimuth)), float(cosine)
-        for k, (tensor, near, tail) in enumerate(known):
+        for k, (tensor, near, tail) in enumerate(each):
             lit = [(near, lobes[k, :, i]), (widths.veil(found, k, cosines, tensor), veils[k, :, i])]
             if tail:
                 lit = [(near, (1 - tail.share[i]) * lit[0][1]), (tail.tensor, tail.share[i] * lit[0][1]), lit[1]]

@@ -196,7 +196,7 @@ def test_lobes_are_as_wide_as_walks(name: str) -> None:
 
 @pytest.mark.parametrize("name", CROSSED)
 def test_light_below_crossed_facets_goes_where_walks_go(name: str) -> None:
-    """Total variation over 20 x 20 bins at a cosine of .5, of which walks make .01; .068 and .069 with one lobe below."""
+    """Total variation over 20 x 20 bins, of which walks make .01; .068 and .069 with one lobe below."""
     kernel.require_llvm()
     stack, bins, cosine, phi = Stack(CROSSED[name]), 20, 0.5, 0.2
     truth = vt.reference.distribution(stack, cosine, phi, 200_000, 1, True, bins=bins).reflected.mean(axis=(0, 1))

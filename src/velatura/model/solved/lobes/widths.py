@@ -12,7 +12,7 @@ below it.
 What first order leaves open is in `CORRECTION`: light that goes back and forth, and that total reflection picks out.
 It turns above all on how much brighter a lobe is than it would be if its light met each interface once.
 Lobes of metals whose facets are long along an axis have `BRUSHED_CORRECTION` in its place, and turn little with the
-plane of incidence.
+plane of incidence. Where these cross brushed facets above, the lobe is parted: its tail lies along its own.
 
 Tensors live in the frame of the plane of incidence (x in the plane, y across it), so that they turn with the layers.
 Values are NumPy's, for directions (M,).
@@ -370,7 +370,8 @@ def _parted(tensor: Tensor, own: Tensor, seen: dict[str, Array], crossed: float)
         coats = 1 - np.minimum(np.array([own.width(angle + turn) for turn in AXES]) / axes, 1) ** fitted.Q
         by_axis = {**seen, "coats": coats, "slanted coats": seen["slant"] * coats}
         change = crossed * sum(number * by_axis[name] for name, number in numbers.items())
-        return Tensor.turned(*(axes * np.exp(np.clip(change, -MOST_PARTED, MOST_PARTED))), angle)
+        u, v = axes * np.exp(np.clip(change, -MOST_PARTED, MOST_PARTED))
+        return Tensor.turned(u, v, angle)
 
     near, tail = scaled(tensor.angle, fitted.NEAR), scaled(own.angle, fitted.TAIL)
     share = crossed / (1 + np.exp(-sum(number * seen[name] for name, number in fitted.TAIL_ODDS.items())))
