@@ -13,7 +13,7 @@ import velatura as vt
 from velatura import kernel
 from velatura.model.solved.transmission import direct
 from velatura.model.solved.transmission.direct import Transmission
-from velatura.model.variance import variance_kind
+from velatura.model.variance import Covariance, Isotropic, variance_kind
 from velatura.stack import Material, number
 
 Array = NDArray[np.floating]
@@ -205,6 +205,17 @@ def test_energy_rises_smoothly_towards_the_critical_angle() -> None:
     energy, *_ = direct.integrals(transmission, (sine, 0 * sine, np.sqrt(1 - sine * sine)))
     assert energy[0, -1] > 0.05
     assert all(0 < a - b < 0.05 for a, b in pairwise(energy[0]))
+
+
+def test_energy_of_nearly_isotropic_interfaces_is_that_of_isotropic_ones() -> None:
+    """Solved as brushed ones are, about the critical angles of a pane rarer than the outside: the same rays."""
+    pane = vt.Stack([vt.Interface(eta=1.35, alpha=0.25), vt.Interface(eta=1.64, alpha=0.53)], exterior=1.7, thin=True)
+    material = Material.of(pane, number)
+    cosine, phi = (x.ravel() for x in np.meshgrid(np.linspace(0.05, 0.95, 31), np.radians([0, 15, 75])))
+    sine = np.sqrt(1 - cosine * cosine)
+    wi = sine * np.cos(phi), sine * np.sin(phi), cosine
+    alike, brushed = (direct.integrals(direct.transmission(material, kind), wi)[0] for kind in (Isotropic, Covariance))
+    np.testing.assert_allclose(brushed, alike, rtol=1e-5, atol=1e-7)
 
 
 def test_drjit_agrees_with_numpy() -> None:

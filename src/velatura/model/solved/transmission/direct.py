@@ -577,9 +577,11 @@ def integrals(
     u, v, rotation = (np.broadcast_to(x, i.p2.shape) for x in reduce(lambda a, b: a + b, widths).roughness(WIDTHS))
     # Cast rays from the middle
     share, weight = low_discrepancy.gauss(nodes[0])
-    # Both sides of the plane of incidence are alike where interfaces have no axes
+    # Both sides of the plane of incidence are alike where interfaces have no axes; elsewhere as many rays for each
+    # side, so that light does not jump between them
     alike = all(isinstance(refraction.width, Isotropic) for refraction in transmission.refractions)
-    phi = (np.arange(nodes[1]) + 0.5) * ((pi if alike else 2 * pi) / nodes[1])
+    turns = nodes[1] if alike else 2 * nodes[1]
+    phi = (np.arange(turns) + 0.5) * (pi / nodes[1])
     rotation = np.arctan2(i.p[1], i.p[0]) if alike else rotation
     n_out = np.asarray(n[-1])
     length = np.sqrt(np.maximum(i.p2, ops.TINY))
@@ -587,7 +589,7 @@ def integrals(
     gap = (1 - bound) * length
     u, v = (np.sqrt(width**2 + gap**2 + MOMENTUM_WIDTH_MIN**2) for width in (u, v))
     middle = *(bound * x for x in i.p), u, v, np.cos(rotation), np.sin(rotation)
-    rays = np.tile(share, nodes[1]), np.tile(weight * (pi / nodes[1]), nodes[1])
+    rays = np.tile(share, turns), np.tile(weight * (pi / turns), turns)
     around = np.repeat(np.cos(phi), nodes[0]), np.repeat(np.sin(phi), nodes[0])
     alone = Transmission(tuple(map(_numbered, transmission.refractions)), transmission.slabs, (), (), (), False, False)
     # A kernel reads what depends on wi alone, which would be a third of it to compile
