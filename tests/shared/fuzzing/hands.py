@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import base64
 import hashlib
+import math
 import random
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -219,7 +220,12 @@ def digest(path: str) -> str:
 
 
 def alike(value: Any, wanted: Any) -> bool:
-    """Whether values are equal, arrays to single precision: another process may work them out in another order."""
+    """Whether values are equal, arrays to single precision, since another process may work them out in another order,
+    and numbers to the eight digits that the page keeps of what pigments make."""
+    if isinstance(value, list) and isinstance(wanted, list):
+        return len(value) == len(wanted) and all(map(alike, value, wanted))
+    if {type(value), type(wanted)} <= {int, float}:
+        return math.isclose(value, wanted, rel_tol=1e-7)
     if not isinstance(value, dict) or not isinstance(wanted, dict):
         return bool(value == wanted)
     if value.keys() != wanted.keys():
