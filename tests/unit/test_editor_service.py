@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import base64
 import json
+import time
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from typing import Any
@@ -21,6 +22,7 @@ from velatura.exports import FORMATS, export
 from velatura.model import MODELS
 from velatura.model.rough_interface import KEPT
 from velatura.scenes import OBJECTS
+from velatura.shader.lookups.columns import SolvedContents, SolvedLookUp
 from velatura.stack import Film, Interface, Stack, loads, preset, presets
 from velatura.stack.layers import LAYERS, entry_name
 from velatura.stack.schema import parameters
@@ -359,6 +361,22 @@ def test_threads_share_the_code_of_a_pattern() -> None:
     assert keys == [shader(material)["key"] for material in materials]
     assert shading._made.cache_info().currsize == 3
     assert shading._made.cache_info().maxsize is not None
+
+
+def test_threads_that_ask_for_the_same_solution_work_it_out_once(monkeypatch: pytest.MonkeyPatch) -> None:
+    solve, solved = SolvedLookUp.solve, []
+
+    def counted(self: SolvedLookUp, stack: Stack, coarse: bool) -> SolvedContents:
+        solved.append(stack)
+        time.sleep(0.2)  # the others ask meanwhile
+        return solve(self, stack, coarse)
+
+    monkeypatch.setattr(SolvedLookUp, "solve", counted)
+    body = {"material": changed(alpha=0.1234), "model": "velatura"}
+    with ThreadPoolExecutor(4) as threads:
+        first, *others = [each["solution"] for each in threads.map(lambda _: VERBS["shader"](body), range(4))]
+    assert len(solved) == 1
+    assert all(each == first for each in others)
 
 
 # Objects, light, texts

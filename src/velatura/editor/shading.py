@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import functools
 import os
-from collections.abc import Iterator, Sequence
+from collections.abc import Hashable, Iterator, Sequence
+from threading import Lock
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -32,6 +33,14 @@ _LOWEST, _STEP = 1.6, 0.1
 
 SOLVED = 32  # solutions of stacks, of which a mixture has several, and a drag changes one
 
+_LOCKS = [Lock() for _ in range(64)]
+
+
+def _in_turn(*question: Hashable) -> Lock:
+    """The lock of a question that is cached, so that one thread works it out and the others wait: a page that shows a
+    material twice asks for it twice at once."""
+    return _LOCKS[hash(question) % len(_LOCKS)]
+
 
 def shading(material: Described, model: Model, stretched: Sequence[bool]) -> dict[str, Any]:
     """The code for a material, its key, and the values that go in; equal keys mean equal code. `closed_form` says that
@@ -47,7 +56,8 @@ def shading(material: Described, model: Model, stretched: Sequence[bool]) -> dic
         InvalidInput: a stack without an interface, or a model, that there is no shader for.
     """
     kind = pattern(material, stretched)
-    made = _made(kind, model)
+    with _in_turn(kind, model):
+        made = _made(kind, model)
     stacks = [stack for _, stack in material.leaves()]
     solvable = model.surrogate is not model
     lines = max(line + part.lines for part, line in zip(made.parts, made.lines))
@@ -116,7 +126,8 @@ def _contents(material: Described, pattern: Described, model: Model, coarse: boo
         tables = films.tables(stack, part.recording.films, model, coarse)
         coated |= {part.prefix + name: table for name, table in tables.items()}
         if _solved(part):
-            found = _solution(pattern, model, number, stack, coarse)
+            with _in_turn(pattern, model, number, stack, coarse):
+                found = _solution(pattern, model, number, stack, coarse)
             solution |= {part.prefix + name: x for name, x in vars(found).items()}
     return {
         "values": {address.name: _plain(address, value) for address, value in _free(material, made)},
