@@ -87,9 +87,9 @@ class Exclusive(contextlib.ContextDecorator):
             self._lock.release()
 
     @contextlib.contextmanager
-    def at_once(self) -> Iterator[bool]:
-        """Hold the lock in a block unless another thread has it; whether it is held. Never waits."""
-        if not self._lock.acquire(blocking=False):
+    def within(self, seconds: float) -> Iterator[bool]:
+        """Hold the lock in a block unless another thread keeps it longer, 0 seconds or more; whether it is held."""
+        if not self._lock.acquire(timeout=min(seconds, threading.TIMEOUT_MAX)):
             yield False
             return
         try:
@@ -180,7 +180,7 @@ def numbers(value: Any) -> list[float]:
 
 def return_memory() -> None:
     """Return freed memory to the system: what the C library keeps of it, once in `TRIMMED` seconds, and what Dr.Jit
-    keeps, if it has held `MUCH` at once since the last time.
+    keeps, if it has held `MUCH` at once since the last time and no other thread works with it.
 
     The C library keeps it for each thread, Dr.Jit all of it by size, for what may need as much again.
     """
@@ -192,9 +192,10 @@ def return_memory() -> None:
     if not _drjit.cache_info().currsize:
         return
     dr = _drjit()
-    if dr.detail.malloc_watermark(dr.JitBackend.LLVM) > MUCH:
-        dr.flush_malloc_cache()
-        dr.detail.malloc_clear_statistics()
+    with exclusive.within(0) as alone:
+        if alone and dr.detail.malloc_watermark(dr.JitBackend.LLVM) > MUCH:
+            dr.flush_malloc_cache()
+            dr.detail.malloc_clear_statistics()
 
 
 @functools.cache

@@ -1,6 +1,8 @@
 """Functions over many samples: the same by NumPy and by a kernel; and results that are kept."""
 
 import gc
+import subprocess
+import sys
 from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
@@ -210,6 +212,34 @@ def test_garbage_waits_until_a_kernel_is_recorded(monkeypatch: pytest.MonkeyPatc
         compiled.over(littering, SOURCES, SAMPLES, numbers(), ROWS)
     finally:
         gc.set_threshold(*thresholds)
+
+
+LAUNCHES = """
+import sys, threading, time
+sys.setswitchinterval(1e-5)
+sys.path.insert(0, sys.argv[1])
+import pytest
+from test_compiled import SAMPLES, SOURCES, by_kernels, compiled, function, kernel, numbers
+
+by_kernels(pytest.MonkeyPatch())
+compiled.over(function, SOURCES, SAMPLES, numbers(), 8)
+end = time.monotonic() + 2
+
+def repeat(work):
+    while time.monotonic() < end:
+        work()
+
+launch = lambda: compiled.over(function, SOURCES, SAMPLES, numbers(), 8)
+threads = [threading.Thread(target=repeat, args=[work]) for work in (launch, launch, kernel.return_memory)]
+for thread in threads: thread.start()
+for thread in threads: thread.join()
+"""
+
+
+def test_threads_that_launch_kernels_and_return_memory_do_not_wait_for_ever() -> None:
+    """Rationale: one had Dr.Jit's lock and waited for Python's, the other had Python's and waited for Dr.Jit's."""
+    command = [sys.executable, "-c", LAUNCHES, str(Path(__file__).parent)]
+    subprocess.run(command, check=True, timeout=120)
 
 
 def test_another_number_or_address_needs_no_other_kernel(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -13,11 +13,11 @@ import functools
 import gc
 import hashlib
 import itertools
+import math
 from collections import Counter, OrderedDict
 from collections.abc import Callable, Hashable, Iterator, Sequence
 from dataclasses import dataclass, fields, is_dataclass, replace
 from pathlib import Path
-from threading import Lock
 from types import MethodType
 from typing import Any, NamedTuple
 
@@ -41,12 +41,12 @@ BLOCK = 1 << 15  # values at a time, which a processor's cache holds
 COLOURS = 3
 KERNELS = 64  # kinds whose launches are kept
 UNUSED = 256  # kinds whose launches were kept, from which their kernels are released
+WAIT = 0.1  # seconds for a thread that launches another kernel; NumPy takes its place where one renders, or compiles
 SIZES = 16  # of each: which numbers of sources, samples and rows are alike
 
 _asked: Counter[Hashable] = Counter()  # values that NumPy has worked out, by kind
 _kernels: OrderedDict[Hashable, Any] = OrderedDict()
 _unused = 0  # kinds
-_launching = Lock()
 
 
 class Deposit(NamedTuple):
@@ -112,7 +112,11 @@ def over(
             many = _asked[asked] > (MANY_DEPOSITED if rows else MANY)
             kernels = kernel.llvm() if many or kernel.compiles_first() or _mark(asked).exists() else None
             if kernels:
-                return _compiled(kernels, asked, function, sources, samples, numbers, read, rows)
+                # A launch looks at its arguments by Python while it holds Dr.Jit's own lock, and a thread that asks
+                # Dr.Jit for anything else meanwhile holds Python's: both would wait for ever
+                with kernel.exclusive.within(math.inf if kernel.compiles_first() else WAIT) as alone:
+                    if alone:
+                        return _compiled(kernels, asked, function, sources, samples, numbers, read, rows)
     size = max(BLOCK // count, 1)
     found = []
     for first in range(0, max(width, 1), size):
@@ -208,28 +212,27 @@ def _compiled(
     tables = [packets(x.data.ravel(), x.data.shape[-1], module, double=True) for x in read.tables]
     lit = [array(x) for x in sources], [array(x.T if x.ndim > 1 else x) for x in samples]
     given = *lit, array([0.0, *read.flat]), [table.values for table in tables], sizes
-    with _launching:
-        if kind not in _kernels:
-            _kernels[kind] = _kernel(module, function, sources, samples, numbers, tables, rows)
-            with contextlib.suppress(OSError):
-                _mark(kind).touch()
-            if len(_kernels) > KERNELS:
-                _kernels.popitem(last=False)
-                _unused += 1
-        _kernels.move_to_end(kind)
-        of_kind = _kernels[kind]
-        found = dr.opaque(module.Float64, 0.0, max(sum(of_kind.counts), 1) * width)
-        outs = [
-            [dr.opaque(module.Float64, 0.0, (rows + 1) * width * part) for _, part in _packets(values * waves)]
-            for values, waves in of_kind.lights
-        ]
-        with _uncollected():
-            found, outs = of_kind.launch(_numbered(module.UInt32, lanes), *given, found, outs)
-        totals, greatest, _ = np.split(found.numpy().reshape(-1, width), np.cumsum(of_kind.counts))
-        lights = []
-        for (values, waves), parts in zip(of_kind.lights, outs):
-            light = np.concatenate([x.numpy().reshape(rows + 1, width, -1) for x in parts], axis=-1)
-            lights.append(np.moveaxis(light[..., : values * waves], -1, 0).reshape(values, waves, rows + 1, width))
+    if kind not in _kernels:
+        _kernels[kind] = _kernel(module, function, sources, samples, numbers, tables, rows)
+        with contextlib.suppress(OSError):
+            _mark(kind).touch()
+        if len(_kernels) > KERNELS:
+            _kernels.popitem(last=False)
+            _unused += 1
+    _kernels.move_to_end(kind)
+    of_kind = _kernels[kind]
+    found = dr.opaque(module.Float64, 0.0, max(sum(of_kind.counts), 1) * width)
+    outs = [
+        [dr.opaque(module.Float64, 0.0, (rows + 1) * width * part) for _, part in _packets(values * waves)]
+        for values, waves in of_kind.lights
+    ]
+    with _uncollected():
+        found, outs = of_kind.launch(_numbered(module.UInt32, lanes), *given, found, outs)
+    totals, greatest, _ = np.split(found.numpy().reshape(-1, width), np.cumsum(of_kind.counts))
+    lights = []
+    for (values, waves), parts in zip(of_kind.lights, outs):
+        light = np.concatenate([x.numpy().reshape(rows + 1, width, -1) for x in parts], axis=-1)
+        lights.append(np.moveaxis(light[..., : values * waves], -1, 0).reshape(values, waves, rows + 1, width))
     return totals, greatest, lights
 
 
@@ -241,15 +244,12 @@ def release_kernels() -> None:
 
     if _unused < UNUSED:
         return
-    with kernel.exclusive.at_once() as alone:
-        if alone and _launching.acquire(blocking=False):
-            try:
-                dr.sync_thread()
-                _kernels.clear()  # launches need the kernels that they have recorded
-                dr.flush_kernel_cache()
-                _unused = 0
-            finally:
-                _launching.release()
+    with kernel.exclusive.within(0) as alone:
+        if alone:
+            dr.sync_thread()
+            _kernels.clear()  # launches need the kernels that they have recorded
+            dr.flush_kernel_cache()
+            _unused = 0
 
 
 def _kernel(
