@@ -56,13 +56,15 @@ class Variables:
         low, high = (x if np.any(denser & ~_denser(self._with(self.start, k, end))) else end for end in ends)
         return (low, high) if low < high else ends
 
-    def matched(self) -> Iterator[tuple[int, float, tuple[float, float]]]:
-        """Indices beside a kink, whose steps end there, or over which another side of an interface gets the denser one:
-        the number of the variable, its value, and the ends of the step."""
+    def by_whole(self) -> Iterator[tuple[int, float, tuple[float, float]]]:
+        """Indices by which slopes are differences of whole BSDFs: the number of the variable, its value, and the ends
+        of the step. They are beside a kink, where steps end or over which another side of an interface gets the denser
+        one, or light passes a medium rarer than the outside: its edges, beyond which facets face away, move."""
+        edged = self.start.transmits and not _denser(self.start).all()
         for k, x in enumerate(self._numbers):
             if self.addresses[self.given[k].places[0][0]].role == "eta":
                 ends = self.around(k, x)
-                if x in ends or len({_steps(self._with(self.start, k, each)) for each in ends}) > 1:
+                if edged or x in ends or len({_steps(self._with(self.start, k, each)) for each in ends}) > 1:
                     yield k, x, ends
 
     def ends(self, material: Material) -> Iterator[Material]:

@@ -61,7 +61,7 @@ class SolvedModel(Model):
 
     def body(self, material: Material, variance: type[Variance], context: Context) -> Body:
         from velatura import metals
-        from velatura.model.solved import matched_index, rotation_frame, smooth_metal, solve
+        from velatura.model.solved import rotation_frame, smooth_metal, solve, whole_differences
         from velatura.model.solved.energies.wavelengths import WAVELENGTHS
 
         if not _is_solved(material):
@@ -74,7 +74,7 @@ class SolvedModel(Model):
             frame = rotation_frame.frame(material)
             return frame.turned(solve.solve(frame.back(material), self, frame.kind(variance), context), material)
 
-        return matched_index.body(material, solved)
+        return whole_differences.body(material, solved)
 
     def lit(self, material: Material, wi: Direction) -> Callable[[Any], Body]:
         if self.form != "forward" or not _is_solved(material):

@@ -1,7 +1,8 @@
-"""Gradients by an index that a medium beside it has as well, or nearly: differences of the whole BSDF.
+"""Gradients by an index beside a kink of light, or by one that moves edges of light: differences of the whole BSDF.
 
-Light has a kink there, or is curved like a root of the index. So analytic slopes of shapes, and differences of their
-energies, do not belong together: white materials would gain or lose light.
+Where media beside each other have one index, or nearly, light has a kink or is curved like a root of the index. Light
+that passes a medium rarer than the outside ends at edges that move with the index, which analytic slopes of shapes do
+not see. So these and differences of energies do not belong together: white materials would gain or lose light.
 """
 
 from __future__ import annotations
@@ -17,20 +18,20 @@ from velatura.stack import Material
 
 
 def body(material: Material, solved: Callable[[Material], Body]) -> Body:
-    """The body that `solved` makes of a material with constants of a renderer; gradients by matched indices are
-    differences of such bodies."""
+    """The body that `solved` makes of a material with constants of a renderer; gradients by indices
+    `Variables.by_whole` are differences of such bodies."""
     given = Variables.of(material)
-    matched = list(given.matched())
-    if not matched:
+    chosen = list(given.by_whole())
+    if not chosen:
         return solved(material)
     ends = list[tuple[Value, Body]]()
-    for k, x, (low, high) in matched:
+    for k, x, (low, high) in chosen:
         share = (given.given[k].number - x) / (high - low)
         if low < x:
             ends.append((-share, solved(given.moved(material, k, low - x))))
         if high > x:
             ends.append((share, solved(given.moved(material, k, high - x))))
-    return WithEnds(solved(given.without(material, [k for k, *_ in matched])), ends)
+    return WithEnds(solved(given.without(material, [k for k, *_ in chosen])), ends)
 
 
 @dataclass(frozen=True)
