@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field, fields, replace
+from functools import lru_cache
 from itertools import accumulate
 
 from velatura.model.solved.lobes import wide
@@ -43,7 +44,10 @@ class Declaration:
     wide: bool = False
 
     @property
-    def columns(self) -> list[Column]:
+    def columns(self) -> tuple[Column, ...]:
+        return _columns(self)
+
+    def _listed(self) -> list[Column]:
         found = [*[Column("roughness")] * self.entries, Column("chance")] * self.lobes
         found += [Column("weight", colour=True)] * self.lobes + [Column("scale", colour=True)]
         found += [Column("energy", colour=True, energy=True)] * self.lobes + [Column("rest", colour=True, energy=True)]
@@ -65,13 +69,13 @@ class Declaration:
         """Which rows are read together: 1 for those that are read seldom."""
         return [int(column.energy) for column in self.columns for _ in range(column.rows(colours))]
 
-    def first_rows(self, name: str, colours: int) -> list[int]:
+    def first_rows(self, name: str, colours: int) -> Sequence[int]:
         """The first row of each column of a name."""
-        return [begin for column, begin in zip(self.columns, self._begins(colours)) if column.name == name]
+        return _first_rows(self, colours).get(name, ())
 
     def rows(self, chosen: Iterable[int], colours: int) -> list[int]:
         """All rows of columns of some numbers."""
-        begins = self._begins(colours)
+        begins = _begins(self, colours)
         return [row for k in chosen for row in range(begins[k], begins[k + 1])]
 
     def part(self, k: int) -> list[int]:
@@ -89,9 +93,6 @@ class Declaration:
 
     def _named(self, begin: str) -> list[int]:
         return [k for k, column in enumerate(self.columns) if column.name.startswith(begin)]
-
-    def _begins(self, colours: int) -> list[int]:
-        return list(accumulate((column.rows(colours) for column in self.columns), initial=0))
 
     def proportions(self, colours: int) -> list[tuple[int, list[int]]]:
         """The first rows of each energy, and of all else that is in proportion to it."""
@@ -127,6 +128,29 @@ class Declaration:
         narrow = by_name.get("narrow", [1.0])[0]
         reflected = weights, roughness, chances, energies, scale, chance, rest
         return Columns(*reflected, passes, passed, of_top, narrow, reflecting, passing)
+
+
+# Materials of one kind ask for the same ones at each change of a value
+
+
+@lru_cache(maxsize=256)
+def _columns(declaration: Declaration) -> tuple[Column, ...]:
+    return tuple(declaration._listed())
+
+
+@lru_cache(maxsize=256)
+def _begins(declaration: Declaration, colours: int) -> tuple[int, ...]:
+    """The first row of each column, and after them the number of all rows."""
+    return tuple(accumulate((column.rows(colours) for column in declaration.columns), initial=0))
+
+
+@lru_cache(maxsize=256)
+def _first_rows(declaration: Declaration, colours: int) -> dict[str, list[int]]:
+    """Those of the columns of each name, not to be written to."""
+    found: dict[str, list[int]] = {}
+    for column, begin in zip(declaration.columns, _begins(declaration, colours)):
+        found.setdefault(column.name, []).append(begin)
+    return found
 
 
 @dataclass(frozen=True)
