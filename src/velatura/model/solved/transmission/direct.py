@@ -569,7 +569,8 @@ def integrals(
     tails of GGX do; their numbers are those along a ray, and of rays.
     """
     n = transmission.indices
-    i = entered(transmission, wi)
+    arriving = _Arriving.of(transmission, wi)
+    i = arriving.momentum
     widths = [
         c.width * ops.power(np.abs(step) + ops.TINY, fitted.EXPONENT)
         for c, step in zip(transmission.refractions, i.steps)
@@ -593,9 +594,12 @@ def integrals(
     around = np.repeat(np.cos(phi), nodes[0]), np.repeat(np.sin(phi), nodes[0])
     alone = Transmission(tuple(map(_numbered, transmission.refractions)), transmission.slabs, (), (), (), False, False)
     # A kernel reads what depends on wi alone, which would be a third of it to compile
-    arriving, rows = _Arriving.of(transmission, wi), list[Array]()
-    arriving = replace(arriving, momentum=replace(i, n=[], cosines=[], passes=[], slabs=[]))
-    arriving = replace(arriving, comes=[*np.broadcast_arrays(*map(np.atleast_2d, arriving.comes))])
+    rows = list[Array]()
+    arriving = replace(
+        arriving,
+        momentum=replace(i, n=[], cosines=[], passes=[], slabs=[]),
+        comes=[*np.broadcast_arrays(*map(np.atleast_2d, arriving.comes))],
+    )
     numbers = wider(alone), _placed(arriving, rows, len(i.p2)), Colour(np.ones((compiled.COLOURS, 1, 1)))
     found, _, _ = compiled.over(_passed, (*middle, *rows), (*rays, *around), numbers)
     *energy, passes = found
