@@ -39,6 +39,7 @@ LEAST = 2_000  # values at a time: for fewer, a kernel takes longer to launch th
 SHARED = 2_000_000  # values at a time, from which several threads run a kernel; see `_lanes`
 BLOCK = 1 << 15  # values at a time, which a processor's cache holds
 COLOURS = 3
+LISTS, FLOATS, CONSTANTS = (list, tuple), (float, np.floating), (int, str, type)  # unions take longer to make
 KERNELS = 64  # kinds whose launches are kept
 UNUSED = 256  # kinds whose launches were kept, from which their kernels are released
 WAIT = 0.1  # seconds for a thread that launches another kernel; NumPy takes its place where one renders, or compiles
@@ -418,32 +419,33 @@ def _kind(value: Any, read: _Read) -> Hashable:
 
     Raises _Foreign for what no kernel reads.
     """
-    if isinstance(value, Number):
+    own: Any = type(value)
+    if own is float:  # as most are; a launch has hundreds of values
+        if value in (0, 1):
+            return value
+        read.flat.append(value)
+        return float
+    if own is Number:
         read.flat.append(value)
         return Number
-    if isinstance(value, list | tuple):
-        return type(value), *[_kind(x, read) for x in value]
+    if isinstance(value, LISTS):
+        return own, *[_kind(x, read) for x in value]
     if isinstance(value, np.ndarray):
         if value.size > 1:
             if value.ndim == 1 or value.size != COLOURS:
                 raise _Foreign
             read.flat.extend(value.ravel().tolist())
             return np.ndarray
-        value = value.item()
-    if isinstance(value, float | np.floating):
-        plain = float(value)
-        if plain in (0, 1):
-            return plain
-        read.flat.append(plain)
-        return float
-    if value is None or isinstance(value, int | str | type):
+        return _kind(value.item(), read)
+    if value is None or isinstance(value, CONSTANTS):
         return value
+    if isinstance(value, FLOATS):
+        return _kind(float(value), read)
     if isinstance(value, Curves) and isinstance(value.data, np.ndarray):
         read.tables.append(value)
         return Curves, value.data.shape
     if isinstance(value, MethodType):
         return value.__name__, _kind(value.__self__, read)
-    own: Any = type(value)
     names = _fields(own)
     if names is None:
         raise _Foreign

@@ -636,7 +636,7 @@ def _placed(values: _Arriving, rows: list[Array], count: int) -> _Arriving:
         if isinstance(value, float) and value == 0:
             return value
         each = np.atleast_2d(value)
-        rows.extend(np.broadcast_to(each, (len(each), count)))
+        rows.extend(each if each.shape[-1] == count else np.broadcast_to(each, (len(each), count)))
         return _Rows(len(rows) - len(each), len(each))
 
     found: _Arriving = mapped(values, np.ndarray | float, place)
