@@ -87,7 +87,7 @@ def _part(layers: WalkedLayers, wi: Array, count: int, seed: int, start: int, po
     w = np.stack([component.numpy() for component in path.w])
     stokes = np.stack([part.numpy() for part in parts]) if parts else None
     deepest = np.array(layers.above, np.uint32)[path.deepest.numpy()]
-    return Ends(w, weight.numpy(), deepest, float(cut_off.numpy().mean()), stokes)
+    return Ends(w, np.array(weight.numpy()), deepest, float(cut_off.numpy().mean()), stokes)
 
 
 @kernel.exclusive

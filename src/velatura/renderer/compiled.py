@@ -229,7 +229,8 @@ def _compiled(
     ]
     with _uncollected():
         found, outs = of_kind.launch(_numbered(module.UInt32, lanes), *given, found, outs)
-    totals, greatest, _ = np.split(found.numpy().reshape(-1, width), np.cumsum(of_kind.counts))
+    # Copies, since an array of NumPy's that has Dr.Jit's memory asks it for its lock wherever it is released
+    totals, greatest, _ = np.split(np.array(found.numpy()).reshape(-1, width), np.cumsum(of_kind.counts))
     lights = []
     for (values, waves), parts in zip(of_kind.lights, outs):
         light = np.concatenate([x.numpy().reshape(rows + 1, width, -1) for x in parts], axis=-1)
