@@ -58,6 +58,10 @@ export function createClass(services, panel) {
     try {
       const answer = await panel.ask('class', question);
       if (!answer || asked !== text) return;
+      if (panel.held()) {
+        asked = ''; // what has been changed meanwhile is on the map that is here, and not on this one
+        return;
+      }
       card = decoded(answer);
       problem = '';
       pictures = pathOf(card).map((stop) => ({ ...stop, image: null }));
