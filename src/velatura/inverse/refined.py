@@ -41,7 +41,7 @@ LEAST_READINGS, MOST_READINGS = 5, 8  # of stacks, for one way
 SAID = 1e-4  # changes of quantities that are mentioned, as logarithms
 TRIES, OWN, FEWER = 6, 4, 4  # stacks that are begun with; those that have the lobes of one target; where none has
 PARTS = (1.0, 0.5, 0.25)  # of a correction, where all of it has no stack
-FOLLOWED = 12  # readings of a search that follows the closed form
+FOLLOWED, EXACT = 12, 2e-7  # readings of a search that follows the closed form, and by which these may miss
 LIKELY = 3  # stacks that it begins with
 MAPPED = 4  # requests, each corrected by what the model misses of the last one's stack
 SAME = 0.03  # logarithm by which models differ about the energy of an index
@@ -90,7 +90,7 @@ def _followed(found: Solution, target: Target, model: Model) -> Solution | None:
     if dragged is None or dragged.achromatic(target) is not target:
         return None
     here, goal = dragged.point.reading.value, dragged.space.goal(target)
-    there = Line(dragged.point, here, goal, *dragged.constant(target)).last(FOLLOWED)
+    there = Line(dragged.point, here, goal, *dragged.constant(target), enough=EXACT).last(FOLLOWED)
     if there.bound is not None or not there.settled:
         return None
     return Solution(target, model, tuple(there.point.layers))
