@@ -21,8 +21,8 @@ from velatura.programs.parameters import UNIT, Values, complete
 from velatura.programs.program import Bake, Carried, Fitted, Program, Range
 from velatura.programs.sampled import Sampled
 from velatura.programs.surface import WHITE, Surface
-from velatura.programs.textures import FIELD, carried, means
-from velatura.stack import Material, MaterialLike, Mix, Stack, load
+from velatura.programs.textures import carried, means
+from velatura.stack import Brushing, Material, MaterialLike, Mix, Stack, load
 from velatura.stack.schema import unknown
 
 FITTED, AZIMUTHS = (1.0, 0.85, 0.6, 0.35), (0.0, 60.0, 120.0)  # cosines of incidence, and degrees where brushed
@@ -81,14 +81,16 @@ def bake(
         over = None if grid is None else _over(grid, material, found, chosen, program, fit, progress)
 
     varying = dict(carried(material, found, program, fit.values))
-    left = [f"{name}: {what}" for name, what in varying.items() if isinstance(what, str)]
-    images = {name: image for name, image in varying.items() if isinstance(image, Carried)}
-    remarks: tuple[str, ...] = ()
-    values, loss = fit.values, _loss(program, fit.values, described, chosen, REPORTED)
-    if over is not None:
-        left = [*over.unmoved, *(line for line in left if line.endswith(FIELD))]
+    left = {name: f"{name}: {what}" for name, what in varying.items() if isinstance(what, str)}
+    if over is None:
+        values, loss = fit.values, _loss(program, fit.values, described, chosen, REPORTED)
+        images = {name: image for name, image in varying.items() if isinstance(image, Carried)}
+        lost, remarks = [*left.values()], tuple[str, ...]()
+    else:
+        values, loss = {**fit.values, **over.mapped.means()}, over.loss
         images = over.mapped.images(program, material.name)
-        values, loss, remarks = {**values, **over.mapped.means()}, over.loss, over.remarks
+        fields = {at.name for at, value in material.values() if isinstance(value, Brushing)}
+        lost, remarks = [*over.unmoved, *(line for name, line in left.items() if name in fields)], over.remarks
     return Bake(
         target=target,
         title=program.title,
@@ -97,7 +99,7 @@ def bake(
         values=values,
         cos_theta=COSINES,
         **loss,
-        lost=(*_lost(stacks, program), *left),
+        lost=(*_lost(stacks, program), *lost),
         images=images,
         thin=described.thin,
         maps=remarks,

@@ -23,7 +23,7 @@ from velatura.stack.schema import show
 LARGEST = 4096  # texels of an image across
 NODES, AT_ONCE = 64, 8  # stacks that are fitted, at most and between two looks at what the last ones changed
 NEAR = 0.01  # of a parameter's greatest value, to which interpolation has to predict fits in the mean
-LEVELS = 255  # of numbers of a texel, in images and in values that are told apart
+LEVELS = 255  # steps of a number, in images and between values that count as different
 SAME = 0.5 / LEVELS  # of the greatest value, by which a parameter may vary without an image
 
 

@@ -12,8 +12,6 @@ from velatura.programs.program import Carried, Program
 from velatura.programs.values import Array, texels
 from velatura.stack import Address, Brushing, Described, Stack, Texture, Varying
 
-FIELD = "the field is replaced by its offset"
-
 Means: TypeAlias = dict[str, "float | RGB"]
 
 
@@ -58,7 +56,11 @@ def carried(stack: Described, found: Means, program: Program, values: Values) ->
         taken = None
         if isinstance(stack, Stack) and isinstance(value, Texture):
             taken = _taken(stack, address, value, found, program, values)
-        stands = FIELD if isinstance(value, Brushing) else "the image is replaced by its mean"
+        stands = (
+            "the field is replaced by its offset"
+            if isinstance(value, Brushing)
+            else "the image is replaced by its mean"
+        )
         yield taken or (address.name.removesuffix("_u") if address.key == "alpha_u" else address.name, stands)
 
 
