@@ -482,6 +482,35 @@ def test_the_coat_of_a_metal_is_dragged_to_a_pink_edge(visit: Open) -> None:
     assert (red + blue) / (2 * green) > 1.05
 
 
+LATE_MAPS = """(() => {
+  const { send } = WebSocket.prototype;
+  WebSocket.prototype.send = function (text) {
+    setTimeout(() => send.call(this, text), String(text).includes('"class"') ? 1500 : 0);
+  };
+})()"""
+
+
+def test_what_is_typed_before_the_map_arrives_is_kept(visit: Open) -> None:
+    """Expected: sliders of a coat show what the point was dragged to, and each is taken, though the map is as it was."""
+    page = visit()
+    page.page.evaluate(LATE_MAPS)
+    page.page.evaluate("void (velatura.viewport.thumbnail = () => new Promise(() => {}))")
+    open_material(page, "Bati 2021, figure 16")
+    look = panel(page)
+    look.get_by_text("absorption 0 to").wait_for()
+    drag_member(page, 0.15, 0.4)
+    answered(page)
+    for channel, depth in (("red", 0), ("blue", 0), ("green", 0.3)):
+        field = look.get_by_label(f"Absorption of the coat, {channel}", exact=True)
+        if channel != "red":  # typed before; the map may arrive now
+            page.page.wait_for_function("(field) => Number(field.value) > 0.1", arg=field.element_handle())
+        field.fill(str(depth))
+        field.press("Enter")
+        answered(page)
+    (medium,) = [layer["keys"]["sigma_a"] for layer in page.state("layers") if layer["kind"] == "medium"]
+    assert medium == pytest.approx([0, 0.3, 0], abs=1e-6)
+
+
 # What cannot be ------------------------------------------------------------------------------------------------------
 
 

@@ -38,6 +38,7 @@ export function createClass(services, panel) {
   const { call, viewport } = services;
   let card = null; // the map
   let asked = ''; // what it is of
+  let begun = null; // depths from which a step began, so that its end does not depend on the way of the hand
   let problem = '';
   let pictures = []; // of members along the path: {place, tint, material, image, problem}
   let timer = null;
@@ -93,27 +94,37 @@ export function createClass(services, panel) {
   function move(point, map) {
     const place = map ? card.conductor : card;
     place.member = point;
-    panel.paint();
     take(map ? { point, map } : wishOf({ place: point }));
+    panel.paint();
   }
 
+  /** Requests another member. The map that shows what this one absorbs comes later than the next wish may. */
   function take(wish) {
+    begun ??= card.depths;
+    const wished = Object.entries(wish.depths ?? {}).map(([name, value]) => [name, { ...card.depths[name], value }]);
+    card.depths = { ...card.depths, ...Object.fromEntries(wished) };
     const body = { target: panel.target(), lobe: panel.chosen(), ...wish };
     panel.want({ verb: 'member', body, command: setMember });
   }
+
+  function letGo() {
+    begun = null;
+    panel.letGo();
+  }
+
+  /** What a medium absorbs, where a step began. */
+  const depthOf = (name) => (begun ?? card.depths)[name].value;
 
   /** What `member` takes for a place on the map, or for a tint: above a conductor the second axis is a depth. */
   function wishOf({ place, tint }) {
     if (tint !== undefined) return { point: [...card.point.slice(0, -1), tint] };
     if (card.kind !== 'pair over a conductor') return { point: place };
-    const { value } = card.depths.tau_1;
-    return { point: [place[0], card.point[1]], depths: { tau_1: alike(value, place[1]) } };
+    return { point: [place[0], card.point[1]], depths: { tau_1: alike(depthOf('tau_1'), place[1]) } };
   }
 
   function deepen(name, value) {
-    card.depths[name] = { ...card.depths[name], value };
-    panel.paint();
     take({ depths: { [name]: value } });
+    panel.paint();
   }
 
   const drawn = (one, map) =>
@@ -127,7 +138,7 @@ export function createClass(services, panel) {
       path: map ? [] : pictures.flatMap(({ place }) => (place ? [place] : [])),
       height: one.axes.length > 1 ? TALL : LOW,
       onMove: (point) => move(point, map),
-      onLetGo: panel.letGo,
+      onLetGo: letGo,
     });
 
   function view() {
@@ -156,9 +167,9 @@ export function createClass(services, panel) {
         move,
         set(number) {
           move(number);
-          panel.letGo();
+          letGo();
         },
-        settle: panel.letGo,
+        settle: letGo,
         refuse: (words) => services.messages.complain('appearance', words, { passing: true }),
       };
       const label = `${title}, ${channel}`;
@@ -167,7 +178,7 @@ export function createClass(services, panel) {
     };
     const within = (number, index) => Math.min(Math.max(number, low[index]), high[index]);
     return html`<p class="faint">${title}, optical depth at normal incidence:</p>
-      ${slider('all', mean(value), Math.min(...high), (number) => alike(value, number).map(within))}
+      ${slider('all', mean(value), Math.min(...high), (number) => alike(depthOf(name), number).map(within))}
       ${CHANNELS.map((channel, index) =>
         slider(channel, value[index], high[index], (number) => value.map((old, n) => (n === index ? number : old))),
       )}`;
@@ -181,7 +192,7 @@ export function createClass(services, panel) {
         aria-label="Take member ${index + 1} of the path"
         @click=${() => {
           take(wishOf(stop));
-          panel.letGo();
+          letGo();
         }}
       >
         <canvas
