@@ -177,6 +177,8 @@ def test_what_is_solved_comes_with_the_code_and_by_itself() -> None:
     assert (stack["baked"], stack["solved"], made["tables"]) == (None, True, None)
     assert stack["shares"] == ["reflected[0].chance", "reflected[1].chance", "remainder_chance"]
     assert stack["shown"] == ["reflected[0]", "reflected[1]", "remainder"]
+    crossed = [changed(alpha=[0.1, 0.3])["layers"][0], {"interface": {"conductor": "Au", "alpha": [0.3, 0.1]}}]
+    assert "reflected[2].chance" in shader({"layers": crossed})["parts"][0]["shares"]  # the tail of the metal's lobe
     values = VERBS["values"]({"material": COAT})
     assert values == {key: made[key] for key in ("values", "films", "solution")}
     coarse = VERBS["values"]({"material": COAT, "coarse": True})

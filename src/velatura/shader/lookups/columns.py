@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, fields, replace
-from itertools import count, islice
+from itertools import count, cycle, islice
 from math import pi
 from typing import Any
 
@@ -170,7 +170,7 @@ def tabulated(stack: Stack, material: Material, model: Model, variance: type[Var
         material = material.each(lambda address, x: x - by if address.key == "rotation" else x)
     solver = Solver.of(model, variance, Context(), None if general else plain)
     solver = replace(solver, phase_of=_of_numbers if general else _printed)
-    layouts = solver.layouts([_eventful(plain, material) if general else plain])
+    layouts = solver.layouts([_eventful(plain, material, variance) if general else plain])
     if general and layouts[0].apart and solve.has_one_medium(plain):
         layouts = [replace(layout, alone=True) for layout in layouts]
     may_be_wide = general and _may_be_wide(plain, layouts[0], variance)
@@ -386,10 +386,11 @@ def _colours(side: SolvedSide) -> Array:
     return side.numbers.reshape(-1, side.polynomial.c_00.shape[-1])
 
 
-def _eventful(material: Material, written: Material) -> Material:
+def _eventful(material: Material, written: Material, variance: type[Variance]) -> Material:
     """A material that draws all that layers like those that are `written` may have: media scatter, all indices differ,
-    and brushed interfaces cross."""
+    and interfaces that can be brushed cross."""
     depth, g = SCATTERING
+    crossed = cycle((BRUSHED, BRUSHED[::-1]))
 
     def eventful(k: int, layer: Any) -> Any:
         if isinstance(layer, MediumValues):
@@ -398,11 +399,9 @@ def _eventful(material: Material, written: Material) -> Material:
             return layer
         seen = written.layers[k]
         assert isinstance(seen, InterfaceValues)
-        if not is_same(seen.alpha_u, seen.alpha_v):
-            u, v = (BRUSHED, BRUSHED[::-1])[len(found) % 2]
+        if variance is Covariance and not is_same(seen.alpha_u, seen.alpha_v):
+            u, v = next(crossed)
             layer = replace(layer, alpha_u=u, alpha_v=v, rotation=0.0)
-            found.append(k)
         return replace(layer, eta=material.exterior * (1.5 + 0.1 * k)) if layer.kind == "dielectric" else layer
 
-    found: list[int] = []
     return replace(material, layers=tuple(eventful(k, layer) for k, layer in enumerate(material.layers)))
