@@ -462,7 +462,7 @@ def test_a_mirror_that_is_blurred_more_gives_up_energy(monkeypatch: pytest.Monke
 
     monkeypatch.setattr(Space, "_solved", counted)
     answer = appearance.invert({**body, "target": wish})
-    assert len(readings) < 60
+    assert len(readings) < 80
     lobe = answer["target"]["lobes"][1]
     assert answer["snapped"].startswith("lobe 2: not even the brightest metal")
     assert lobe["alpha"] == pytest.approx(wish["lobes"][1]["alpha"], rel=1e-3)

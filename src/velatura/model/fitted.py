@@ -74,7 +74,7 @@ COATS_MAKE = 8, 3
 # Lobes that are parted below crossed facets: from where on; how the logarithm of a width along an axis changes, that of
 # what lies near the mirror direction, and of the tail along the facets of its own interface; log-odds of the tail
 CROSSING, CROSSING_FADE = 0.08, 0.02
-NEAR: dict[str, float] = {"1": -0.155, "coats": 0.232, "slant": -0.102}
+NEAR_MIRROR: dict[str, float] = {"1": -0.155, "coats": 0.232, "slant": -0.102}
 TAIL: dict[str, float] = {"1": 0.78, "coats": -1.01, "slant": 0.6, "slanted coats": -0.29}
 TAIL_ODDS: dict[str, float] = {"1": -1.421, "slant": -0.263, "brighter": 0.808}
 

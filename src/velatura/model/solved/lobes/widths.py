@@ -373,7 +373,7 @@ def _parted(tensor: Tensor, own: Tensor, seen: dict[str, Array], crossed: float)
         u, v = axes * np.exp(np.clip(change, -MOST_PARTED, MOST_PARTED))
         return Tensor.turned(u, v, angle)
 
-    near, tail = scaled(tensor.angle, fitted.NEAR), scaled(own.angle, fitted.TAIL)
+    near, tail = scaled(tensor.angle, fitted.NEAR_MIRROR), scaled(own.angle, fitted.TAIL)
     share = crossed / (1 + np.exp(-sum(number * seen[name] for name, number in fitted.TAIL_ODDS.items())))
     return Width(tensor, near, Tail(tail, share))
 
