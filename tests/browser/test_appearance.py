@@ -491,7 +491,7 @@ LATE_MAPS = """(() => {
 
 
 def test_what_is_typed_before_the_map_arrives_is_kept(visit: Open) -> None:
-    """Expected: sliders of a coat show what the point was dragged to, and each is taken, though the map is as it was."""
+    """Expected: sliders of a coat show what the point was dragged to, and each is taken, before the new map."""
     page = visit()
     page.page.evaluate(LATE_MAPS)
     page.page.evaluate("void (velatura.viewport.thumbnail = () => new Promise(() => {}))")
