@@ -20,7 +20,7 @@ from dataclasses import dataclass, field, replace
 from functools import partial
 
 import numpy as np
-from rows import parsed, row
+from rows import counted, parsed, row
 
 from velatura.figures.bati2021_targets import FIGURES
 from velatura.inverse import Above, Choice, EquivalenceClass, Target, invert, invert_stack
@@ -392,7 +392,7 @@ def main() -> int:
     for part, name, kind in SETS:
         for model in given or map(named, FILMED if part == "films" else [DEFAULT]) if part in parts else ():
             targets = physical_targets(options.physical, model, options.seed, **kind)
-            failed |= stated(name, targets, model) and part != "films"
+            failed |= stated(name, counted(targets, options.physical, name), model) and part != "films"
 
     variants = [named("bati2021", channels="separate"), named("bati2021", reflectance="fresnel")]
     models = given or [*MODELS, *variants]

@@ -11,10 +11,12 @@ of random wishes of `benchmarks/refusals.py` that have a stack, quantiles of the
 from __future__ import annotations
 
 import sys
+from functools import partial
+from itertools import islice
 
 import numpy as np
 from refusals import wish
-from rows import parsed
+from rows import counted, parsed
 
 from velatura.figures import bati2021_25
 from velatura.figures.bati2021_targets import FIGURES
@@ -41,13 +43,10 @@ def width(alpha: float) -> str:
 def wished(count: int, seed: int, model: str, paths: int) -> tuple[list[float], list[float]]:
     """Relative deviations of energies, by channel, and of roughnesses, of lobes of random wishes."""
     rng, energies, alphas = np.random.default_rng(seed), list[float](), list[float]()
-    while count:
-        target = wish(rng)
-        solution = invert.search(target, named(model))
-        if solution is None or solution.reached:
-            continue
-        count -= 1
-        for row, _ in bati2021_25.compared(target, solution.stack, model, paths, count):
+    found = ((target, invert.search(target, named(model))) for target in iter(partial(wish, rng), None))
+    met = ((target, solution.stack) for target, solution in found if solution and not solution.reached)
+    for n, (target, stack) in enumerate(counted(islice(met, count), count, "wishes")):
+        for row, _ in bati2021_25.compared(target, stack, model, paths, count - 1 - n):
             asked, asked_alpha = np.array(row["energy"]["expected"]), row["alpha"]["expected"]
             energy = np.abs(row["energy"]["walk"] / asked - 1)[asked > SEEN]
             alpha = [abs(row["alpha"]["walk"] / asked_alpha - 1)] if asked_alpha and asked.mean() > SEEN else []

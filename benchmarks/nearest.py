@@ -17,10 +17,11 @@ import dataclasses
 import sys
 import time
 from collections.abc import Iterator
+from itertools import islice
 
 import numpy as np
 from inverse import physical_targets
-from rows import parsed, row
+from rows import counted, parsed, row
 
 from velatura.inverse import Infeasible, Target, invert, invert_stack
 from velatura.inverse.local.coordinates import SLACK, Point, Space, units
@@ -55,6 +56,25 @@ def wishes(model: Model, seed: int, beyond: bool = False) -> Iterator[tuple[Drag
         present = DraggedStack.of(found.stack, wish, model) if found else None
         if present is not None:
             yield present, wish
+
+
+def answered(
+    model: Model, seed: int, beyond: bool, seconds: dict[str, list[float]]
+) -> Iterator[tuple[DraggedStack, Target, dict[str, Nearest]]]:
+    """Wishes with their answers at rest and under the hand, whose seconds are noted; those beyond that are met are
+    left out."""
+    for present, wish in wishes(model, seed, beyond):
+        answers, taken = dict[str, Nearest](), dict[str, float]()
+        for way in seconds:
+            start = time.process_time()
+            answers[way] = nearest(present.at(present.point.x), wish, quick=way == "hand")
+            taken[way] = time.process_time() - start
+            if beyond and answers["rest"].met:
+                break
+        else:
+            for way, each in seconds.items():
+                each.append(taken[way])
+            yield present, wish, answers
 
 
 def lobes(target: Target) -> np.ndarray:
@@ -114,21 +134,13 @@ def main() -> int:
         model=DEFAULT,
         seed=0,
     )
-    model, rng, left, failed = named(options.model), np.random.default_rng(options.seed), options.wishes, 0
-    seconds = {"rest": list[float](), "hand": list[float]()}
+    model, rng, failed = named(options.model), np.random.default_rng(options.seed), 0
+    seconds: dict[str, list[float]] = {"rest": [], "hand": []}
     met = alike = 0
-    for present, wish in wishes(model, options.seed, options.beyond):
-        answers = dict[str, Nearest]()
-        for way, taken in seconds.items():
-            start = time.process_time()
-            answers[way] = nearest(present.at(present.point.x), wish, quick=way == "hand")
-            if way == "rest" and answers[way].met and options.beyond:
-                break
-            taken.append(time.process_time() - start)
-        if len(answers) < len(seconds):
-            continue
+    found = islice(answered(model, options.seed, options.beyond, seconds), options.wishes)
+    for present, wish, answers in counted(found, options.wishes, "wishes"):
         rest, hand = answers["rest"], answers["hand"]
-        met, left = met + rest.met, left - 1
+        met += rest.met
         others = [by_invert(present, wish, model), hand.reached]
         apart, quickly = (float(np.abs(lobes(one) - lobes(rest.reached)).max()) for one in others)
         alike += quickly <= SAME
@@ -140,8 +152,6 @@ def main() -> int:
                 f"the hand: {wish.to_dict()['lobes']}",
                 flush=True,
             )
-        if not left:
-            break
     for way, taken in seconds.items():
         row("nearest", way, taken, remark=f"95 % below {np.quantile(taken, 0.95):.2f}, at most {max(taken):.2f} s")
     print(f"{options.model}: {alike} of {options.wishes} answers under the hand have the lobes of that at rest")

@@ -5,12 +5,27 @@ from __future__ import annotations
 import argparse
 import json
 import os
-from collections.abc import Sequence
+import sys
+import time
+from collections.abc import Iterable, Iterator, Sequence
 from pathlib import Path
 from statistics import quantiles
-from typing import Any
+from typing import Any, TypeVar
+
+T = TypeVar("T")
 
 NOTES = "VELATURA_BENCH_ROWS"  # the file that a run of tools/bench.py collects rows in
+PAUSE = 30  # seconds between two reports of a long series
+
+
+def counted(each: Iterable[T], total: int, name: str) -> Iterator[T]:
+    """The things of a series; how many are done is written to the standard error stream from time to time."""
+    start = said = time.monotonic()
+    for done, one in enumerate(each):
+        if time.monotonic() > said + PAUSE:
+            said = time.monotonic()
+            print(f"{name}: {done} of {total} in {said - start:.0f} s", file=sys.stderr, flush=True)
+        yield one
 
 
 def row(table: str, name: str, values: float | Sequence[float], unit: str = "s", remark: str = "") -> None:
