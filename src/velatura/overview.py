@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+import io
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -27,6 +28,8 @@ APART = 1.1  # from one section to the next, in widths
 BAND = 0.22  # height of a band
 UNEVEN = 0.06  # height of a surface of alpha 1
 ROOT = 3.0  # lobes are drawn by this root of their values
+PAGE, DPI = (11, 7.5), 110  # of a file, in inches
+SPP, PIXELS = 64, 320  # samples per pixel of the ball, and its pixels along a side
 
 
 def show(
@@ -34,8 +37,8 @@ def show(
     path: str | Path | None = None,
     model: str | Model = DEFAULT,
     *,
-    spp: int = 64,
-    size: int = 320,
+    spp: int = SPP,
+    size: int = PIXELS,
     progress: Callable[[int, int], None] | None = None,
     **switches: Any,
 ) -> Figure:
@@ -62,12 +65,45 @@ def show(
     target = None if path is None else check_figure(path)
     with needs("plots"):
         from matplotlib import pyplot
+    figure: Figure = pyplot.figure(figsize=PAGE, layout="constrained")
+    _draw(figure, material, model, spp, size, progress, switches)
+    if target:
+        with files.whole(target) as unfinished:
+            figure.savefig(unfinished, dpi=DPI)
+    return figure
+
+
+def page(
+    material: MaterialLike, kind: str, model: str | Model = DEFAULT, *, spp: int = SPP, size: int = PIXELS
+) -> bytes:
+    """The contents of a file of such a page, of a `kind` as Matplotlib has it (png, svg, pdf), in any thread.
+
+    Raises:
+        InvalidInput, MissingTool: as `show`.
+    """
+    with needs("plots"):
+        from matplotlib.figure import Figure
+
+    figure, contents = Figure(figsize=PAGE, layout="constrained"), io.BytesIO()
+    _draw(figure, material, model, spp, size, None, {})
+    figure.savefig(contents, format=kind, dpi=DPI)
+    return contents.getvalue()
+
+
+def _draw(
+    figure: Figure,
+    material: MaterialLike,
+    model: str | Model,
+    spp: int,
+    size: int,
+    progress: Callable[[int, int], None] | None,
+    switches: Mapping[str, Any],
+) -> None:
     from velatura import api
 
     described = load(material)
     lobes = api.lobes(described, COSINES, model=model, **switches)
     drawn = api.lobes(described, np.cos(INCIDENCE), model=model, **switches)
-    figure = pyplot.figure(figsize=(11, 7.5), layout="constrained")
     parts: Any = figure.subfigures(2, 1, height_ratios=(1.25, 1))
     upper, lower = parts
     sections, ball = upper.subplots(1, 2, width_ratios=(1.7, 1))
@@ -86,10 +122,6 @@ def show(
     _draw_numbers(axes[2], lobes)
     name = model if isinstance(model, str) else model.name
     figure.suptitle(f"{_text(described.name or 'Material')} ({name})")
-    if target:
-        with files.whole(target) as unfinished:
-            figure.savefig(unfinished, dpi=110)
-    return figure
 
 
 def _draw_sections(axes: Axes, material: Stack | Mix, lobes: Sequence[StackLobes]) -> None:

@@ -11,6 +11,7 @@ import json
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
+from xml.etree import ElementTree
 
 import chromium
 import numpy as np
@@ -203,6 +204,20 @@ def test_an_export_shows_its_loss_and_what_the_program_has_of_the_material(visit
     back = page.state("view.other.material")
     assert back["layers"][-1]["interface"].get("conductor") is None
     page.settled()
+
+
+def test_a_material_is_taken_on_one_page(visit: Open) -> None:
+    """Expected: what `velatura show` draws, seen before it is taken."""
+    page = visit()
+    button(page, "Export").click()
+    dialog = page.page.locator("dialog.export")
+    page.page.get_by_label("Format", exact=True).select_option("page-svg")
+    dialog.locator("figure img").wait_for(timeout=90_000)
+    page.page.wait_for_function("() => document.querySelector('dialog.export img').naturalWidth > 600")
+    with page.page.expect_download() as download:
+        dialog.get_by_role("button", name="Download .svg").click()
+    assert download.value.suggested_filename == "coated-brushed-gold.svg"
+    assert ElementTree.parse(download.value.path()).getroot().tag.endswith("svg")
 
 
 def test_options_of_the_command_line_are_controls_of_the_formats_that_take_them(visit: Open) -> None:

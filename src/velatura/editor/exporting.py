@@ -8,20 +8,21 @@ from typing import Any
 
 import numpy as np
 
-from velatura import exports
+from velatura import exports, overview
 from velatura.editor.messages import Answer, Body, Verb, array, field, material_of, model_of
 from velatura.imports import FORMATS
 from velatura.programs import BAKED
 
 SHARED = "velatura.tables.bin"  # the file of tables that several exports share
+PAGES = {f"page-{kind}": f".{kind}" for kind in ("png", "svg", "pdf")}  # a material on one page, and the file's ending
 _PASSED = ("prefix", "group", "binding", "baked", "half")  # options that are handed on as they are
 
 
 def formats() -> list[Answer]:
     """The formats of text, as the page offers them: the options that each takes, the ending of its files, and whether
-    `import` reads what is fitted for it."""
+    `import` reads what is fitted for it. Then those of a picture."""
     known = {name: format for name, format in exports.FORMATS.items() if format.is_text}
-    return [
+    texts = [
         {
             "name": name,
             "options": sorted(format.options),
@@ -30,6 +31,7 @@ def formats() -> list[Answer]:
         }
         for name, format in known.items()
     ]
+    return [*texts, *({"name": name, "options": [], "ending": ending, "read": False} for name, ending in PAGES.items())]
 
 
 def export(body: Body) -> Answer:
@@ -37,9 +39,13 @@ def export(body: Body) -> Answer:
     name, what calls of its functions cost, the `loss` by angle, what is `left`, other `notes`, and the facts as JSON.
 
     Values are worked in where they are `fixed` and the format allows that; with `tables`, all lie in one file; `file`
-    is how the text will be called, for the facts.
+    is how the text will be called, for the facts. Of a material on one page, the `picture` and its ending alone.
     """
     to = field(body, "to", str)
+    if to in PAGES:
+        ending = PAGES[to]
+        drawn = overview.page(material_of(body), ending.removeprefix("."), model_of(body))
+        return {"picture": _packed({ending: drawn})[ending], "ending": ending}
     options: dict[str, Any] = {key: body[key] for key in _PASSED if body.get(key) not in (None, False)}
     constant = ["all"] if body.get("fixed") and to in exports.taking("constant") else []
     tables = Path(SHARED) if body.get("tables") else None

@@ -1,4 +1,4 @@
-// The dialog that writes the material for other programs: its text, and how much of it there is, before it is taken.
+// The dialog that writes the material for other programs, or draws it on one page: what is written, before it is taken.
 
 import { html, nothing } from 'lit-html';
 import { createRef, ref } from 'lit-html/directives/ref.js';
@@ -24,6 +24,11 @@ const GROUPS = {
     'mitsuba-xml': 'Mitsuba 3, this plugin',
     'bsdf-xml': 'WINDOW and Radiance, Klems matrices',
   },
+  'One page': {
+    'page-png': 'Layers, ball and lobes, PNG',
+    'page-svg': 'Layers, ball and lobes, SVG',
+    'page-pdf': 'Layers, ball and lobes, PDF',
+  },
   Parameters: { json: 'Numbers, JSON', python: 'Script, Python' },
   'Shader code': {
     osl: 'OSL',
@@ -44,6 +49,7 @@ const SWITCHES = {
   half: ['half', 'Half floats', 'Textures have halves of floats'],
   tables: ['tables', 'Shared tables', 'All tables in one file, which several materials share'],
 };
+const SHOWN = { '.png': 'image/png', '.svg': 'image/svg+xml' }; // pictures, by their endings
 const NUMBERS = { group: 'Group of textures', binding: 'First binding' };
 const WHOLE = { low: 0, high: 65536, default: 0 };
 
@@ -52,6 +58,7 @@ export function createExports({ store, session, call, lacks, files, messages, up
   const dialog = createRef();
   const asked = { to: session.formats.find(({ name }) => !lacks(name)).name };
   let made = null; // the answer of call("export")
+  let drawn = ''; // address of its picture
 
   const format = () => session.formats.find(({ name }) => name === asked.to);
   const takes = (option) => !lacks('options') && format().options.includes(option);
@@ -73,11 +80,14 @@ export function createExports({ store, session, call, lacks, files, messages, up
   async function write(changes = {}) {
     Object.assign(asked, changes);
     made = null;
+    URL.revokeObjectURL(drawn);
     update();
     const given = question(), text = JSON.stringify(given);
     await messages.attempt('export', async () => {
       const answer = await call('export', given);
-      if (text === JSON.stringify(question())) made = answer;
+      if (text !== JSON.stringify(question())) return;
+      made = answer;
+      if (made.picture) drawn = URL.createObjectURL(new Blob([decode(made.picture).array], { type: SHOWN[made.ending] }));
     });
     update();
   }
@@ -104,7 +114,7 @@ export function createExports({ store, session, call, lacks, files, messages, up
         <button type="button" @click=${() => dialog.value.close()}>Close</button>
       </div>
       ${choices()} ${problem ? html`<p class="problem">${problem.text}</p>` : nothing}
-      ${made ? content(made) : problem ? nothing : html`<p>Writing ...</p>`}
+      ${made ? (made.picture ? onePage(made) : content(made)) : problem ? nothing : html`<p>Writing ...</p>`}
     </dialog>`;
   }
 
@@ -129,6 +139,19 @@ export function createExports({ store, session, call, lacks, files, messages, up
       }
       ${numbers.map(([key, label]) => html`<label>${label} ${numberField({ label, value: asked[key] ?? 0, spec: WHOLE, step: 1, edit: edit(key) })}</label>`)}
     </div>`;
+  }
+
+  /** A picture of the material, to look at and to take. */
+  function onePage({ picture, ending }) {
+    const data = decode(picture).array;
+    return html`${
+        SHOWN[ending]
+          ? html`<figure><img src=${drawn} alt="The material on one page: its layers, a ball, and its lobes" /></figure>`
+          : html`<p>A page for print.</p>`
+      }
+      <div class="actions">
+        <button type="button" @click=${() => files.give(data, ending.slice(1))}>Download ${ending} (${bytes(data.byteLength)})</button>
+      </div>`;
   }
 
   function content({ text, ending, beside, apart = {}, costs, loss = [], left = [], notes = [], facts = '' }) {
