@@ -85,12 +85,27 @@ OPERATIONS: dict[str, Callable[..., Array]] = {
     "divide": np.divide,
     "power": np.power,
     "max": np.maximum,
+    "min": np.minimum,
     "sqrt": np.sqrt,
+    "sin": np.sin,
+    "cos": np.cos,
+    "atan2": np.arctan2,
+    "absval": np.abs,
     "clamp": np.clip,
+    "ifgreater": lambda a, b, yes, no: np.where(a > b, yes, no),
+    "ifgreatereq": lambda a, b, yes, no: np.where(a >= b, yes, no),
+    "convert": lambda x: x if np.ndim(x) > 1 else _stacked(x, x, x),
+    "combine2": lambda *each: _stacked(*each),
+    "combine3": lambda *each: _stacked(*each),
     "extract": lambda vector, index: vector[int(index)],
     "dotproduct": lambda a, b: np.sum(a * b, axis=0),
     "crossproduct": lambda a, b: np.cross(a, b, axis=0),
 }
+
+
+def _stacked(*each: Array) -> Array:
+    """Numbers as the parts of one vector."""
+    return np.stack(np.broadcast_arrays(*map(np.atleast_1d, each)))
 
 
 def evaluated(graph: Any, given: Mapping[str, Array]) -> dict[str, Array]:

@@ -11,12 +11,17 @@ from typing import Any
 
 import numpy as np
 import pytest
+from materialx import document, evaluated, generated
 
 import velatura as vt
 from velatura.errors import Incomplete, MissingTool
 from velatura.exports import baked
+from velatura.model import named
 from velatura.programs import embedded
 from velatura.programs.usd.write import PROGRAM
+from velatura.shader.closures import tabulated
+from velatura.shader.polynomials import PolynomialFit
+from velatura.stack import Material
 
 pxr = pytest.importorskip("pxr", reason='usd-core is missing: pip install "velatura[usd]"')
 from pxr import Gf, Sdf, Usd, UsdShade, UsdValidation  # noqa: E402
@@ -56,30 +61,182 @@ def loosened(path: Path) -> Path:
     return other
 
 
+def opened(path: Path, surface: str) -> Any:
+    """The stage of a layer, with this variant of the surface."""
+    stage = Usd.Stage.Open(str(path))
+    with Usd.EditContext(stage, stage.GetSessionLayer()):
+        assert stage.GetDefaultPrim().GetVariantSet("surface").SetVariantSelection(surface)
+    return stage
+
+
 def test_layers_are_valid(painted: vt.Stack, tmp_path: Path) -> None:
     """Expected: no complaint of OpenUSD's validators, but that the wheel knows no nodes of MaterialX; these are defined
-    there, with the inputs, types and outputs that the layer has."""
+    there, with the inputs, types and outputs that the layer has, in all variants. OpenPBR is the default."""
     import MaterialX as mx
 
     library = mx.createDocument()
     mx.loadLibraries(mx.getDefaultDataLibraryFolders(), mx.getDefaultDataSearchPath(), library)
+    validators = UsdValidation.ValidationRegistry().GetOrLoadAllValidators()
+    surfaces = {"openpbr": "ND_open_pbr_surface_surfaceshader", "lobes": "ND_surface", "lobes_osl": "ND_surface"}
     for number, stack in enumerate((painted, GOLD, BRUSHED)):
-        stage = Usd.Stage.Open(str(saved(stack, tmp_path, name=f"{number}.usda")))
-        validators = UsdValidation.ValidationRegistry().GetOrLoadAllValidators()
-        for fault in UsdValidation.ValidationContext(validators).Validate(stage):
-            assert fault.GetName() == "MissingShaderIdInRegistry" and "'ND_" in fault.GetMessage(), fault.GetMessage()
-        material = UsdShade.Material(stage.GetDefaultPrim())
-        assert material.ComputeSurfaceSource("")[0].GetIdAttr().Get() == "UsdPreviewSurface"
-        assert material.ComputeSurfaceSource("mtlx")[0].GetIdAttr().Get() == "ND_open_pbr_surface_surfaceshader"
-        for prim in stage.Traverse():
-            shader = UsdShade.Shader(prim)
-            if not shader or not (name := shader.GetIdAttr().Get()).startswith("ND_"):
-                continue
-            definition = library.getNodeDef(name)
-            assert definition, name
-            for each in shader.GetInputs():
-                assert definition.getActiveInput(each.GetBaseName()), (name, each.GetBaseName())
-            assert [each.getName() for each in definition.getActiveOutputs()] == ["out"]
+        path = saved(stack, tmp_path, name=f"{number}.usda")
+        unchosen = Usd.Stage.Open(str(path))
+        variants = unchosen.GetDefaultPrim().GetVariantSet("surface")
+        assert variants.GetVariantSelection() == "openpbr"
+        assert set(variants.GetVariantNames()) == (set(surfaces) if stack is not painted else {"openpbr"})
+        for variant in variants.GetVariantNames() if stack is GOLD else ["openpbr"]:  # others below, by documents
+            stage = opened(path, variant)
+            for fault in UsdValidation.ValidationContext(validators).Validate(stage):
+                assert fault.GetName() == "MissingShaderIdInRegistry", fault.GetMessage()
+                assert "'ND_" in fault.GetMessage(), fault.GetMessage()
+            material = UsdShade.Material(stage.GetDefaultPrim())
+            assert material.ComputeSurfaceSource("")[0].GetIdAttr().Get() == "UsdPreviewSurface"
+            assert material.ComputeSurfaceSource("mtlx")[0].GetIdAttr().Get() == surfaces[variant]
+            for prim in stage.Traverse():
+                shader = UsdShade.Shader(prim)
+                if not shader or not (name := shader.GetIdAttr().Get()).startswith("ND_"):
+                    continue
+                definition = library.getNodeDef(name)
+                assert definition, name
+                for each in shader.GetInputs():
+                    expected = definition.getActiveInput(each.GetBaseName())
+                    assert expected, (name, each.GetBaseName())
+                    assert str(each.GetTypeName()) == TYPES.get(expected.getType(), expected.getType()), name
+                assert [each.getName() for each in definition.getActiveOutputs()] == ["out"]
+
+
+#: Types of MaterialX as USD has them (UsdMtlx).
+TYPES = {
+    "color3": "color3f",
+    "color4": "color4f",
+    "vector2": "float2",
+    "vector3": "float3",
+    "boolean": "bool",
+    "integer": "int",
+    "filename": "asset",
+    "BSDF": "token",
+}
+
+
+def as_materialx(stage: Any) -> Any:
+    """The network of MaterialX of a stage as a document, as renderers make one of it: nodes by their definitions."""
+    import MaterialX as mx
+
+    made, library = mx.createDocument(), mx.createDocument()
+    mx.loadLibraries(mx.getDefaultDataLibraryFolders(), mx.getDefaultDataSearchPath(), library)
+    kinds = {usd: kind for kind, usd in TYPES.items()}
+    graphs: dict[str, Any] = {}
+    for prim in stage.Traverse():
+        if prim.GetTypeName() == "NodeGraph":
+            graph = graphs[prim.GetName()] = made.addNodeGraph(prim.GetName())
+            for port in UsdShade.NodeGraph(prim).GetInputs():
+                kind = str(port.GetTypeName())
+                connected(graph.addInput(port.GetBaseName(), kinds.get(kind, kind)), port)
+            [result] = UsdShade.NodeGraph(prim).GetOutputs()
+            connected(graph.addOutput("out", "BSDF"), result)
+        shader = UsdShade.Shader(prim)
+        if not shader or not (name := shader.GetIdAttr().Get()).startswith("ND_"):
+            continue
+        definition, parent = library.getNodeDef(name), graphs.get(prim.GetParent().GetName(), made)
+        node = parent.addNode(definition.getNodeString(), prim.GetName(), definition.getType())
+        node.setNodeDefString(name)
+        for port in shader.GetInputs():
+            connected(node.addInput(port.GetBaseName(), definition.getActiveInput(port.GetBaseName()).getType()), port)
+    used = made.addMaterialNode("used", made.getNode("surface"))
+    return mx.writeToXmlString(used.getDocument())
+
+
+def connected(entry: Any, port: Any) -> None:
+    """Give a port of MaterialX what one of USD is connected to, or its value."""
+    if not port.HasConnectedSource():
+        value = port.Get()
+        text = ", ".join(map(str, value)) if hasattr(value, "__len__") and not isinstance(value, str) else str(value)
+        entry.setValueString(value.path if isinstance(value, Sdf.AssetPath) else text)
+        return
+    [source] = port.GetConnectedSources()[0]
+    name = source.source.GetPrim().GetName()
+    if source.sourceType == UsdShade.AttributeType.Input:
+        entry.setInterfaceName(source.sourceName)
+    elif source.source.GetPrim().GetTypeName() == "NodeGraph":
+        entry.setNodeGraphString(name)
+        entry.setOutputString(source.sourceName)
+    else:
+        entry.setNodeName(name)
+
+
+@pytest.mark.parametrize("stack", [GOLD, BRUSHED, PANE], ids=lambda stack: str(stack.kinds))
+def test_lobes_in_usd_have_the_values_of_the_closures(stack: vt.Stack, tmp_path: Path) -> None:
+    """Expected: weights and roughnesses at directions, of what OpenUSD reads, as the polynomials have them in NumPy; of
+    facets that return what they block, and in the variant for OSL of facets that lose it. Constants have single
+    precision. Generators make code of it.
+    """
+    path = saved(stack, tmp_path)
+    rng = np.random.default_rng(4)
+    z, phi = rng.uniform(0.1, 1, 9), rng.uniform(0, 2 * np.pi, 9)
+    wi = np.stack([np.sqrt(1 - z * z) * np.cos(phi), np.sqrt(1 - z * z) * np.sin(phi), z])
+    given = {"viewdirection": -wi, "normal": np.eye(3)[2][:, None] + 0 * wi, "tangent": np.eye(3)[0][:, None] + 0 * wi}
+    for variant, target in (("lobes", "essl"), ("lobes_osl", "osl")):
+        text = as_materialx(opened(path, variant))
+        assert "generalized_schlick_bsdf(" in generated(document(text), target)
+        made = document(text)
+        graph = made.getNodeGraph("lobes")
+        graph.removeOutput("out")
+        lobes = [node for node in graph.getNodes() if node.getCategory().endswith("_bsdf")]
+        for k, lobe in enumerate(lobes):
+            weight = lobe.getInput("color")
+            if lobe.getCategory() == "generalized_schlick_bsdf":
+                [weighed] = [each.getParent().getInput("in2") for each in lobe.getDownstreamPorts()]
+                weight = weighed
+                graph.addOutput(f"roughness{k}", "vector2").setNodeName(lobe.getInput("roughness").getNodeName())
+            graph.addOutput(f"weight{k}", "color3").setNodeName(weight.getNodeName())
+        found = evaluated(graph, given)
+        fit = PolynomialFit(tabulated(Material.of(stack), named("velatura"), conserving=variant == "lobes"))
+        expected = fit.above(tuple(wi))
+        assert len(expected) == len(lobes)
+        for k, closure in enumerate(expected):
+            np.testing.assert_allclose(found[f"weight{k}"], np.broadcast_to(closure.weight, (3, 9)), atol=1e-4)
+            if closure.kind not in ("diffuse", "translucent"):
+                np.testing.assert_allclose(found[f"roughness{k}"], np.stack(closure.roughness[:2]), atol=1e-3)
+
+
+def test_lobes_of_mixtures_and_images_are_in_usd_as_well(tmp_path: Path) -> None:
+    """Expected: a graph for each stack, whatever the material is called, mixed by a mask; images relative to the layer,
+    and inside a package. Where a graph has no lobes the layer says why."""
+    vt.scenes.write_image(np.full((4, 4, 3), 0.5, np.float32), tmp_path / "mask.png")
+    mask = {"texture": str(tmp_path / "mask.png"), "channel": "g"}
+    rough = GOLD.replace(layer0_alpha=mask)
+    mix = vt.Mix([(mask, rough), (None, BRUSHED)], name='0 part1 "layer0" value0 ')
+    made = vt.export(mix, "usd", "weier2020", folder=tmp_path)
+    path, package = made.save(tmp_path / "a.usda")[0], made.save(tmp_path / "a.usdz")[0]
+    assert "as total variation" in " ".join(made.notes) and len(made.facts["lobes"]["loss"]) == 3
+    for stage in (opened(path, "lobes"), opened(path, "lobes_osl")):
+        surface, _, _ = UsdShade.Material(stage.GetDefaultPrim()).ComputeSurfaceSource("mtlx")
+        [[mixed]] = [surface.GetInput("bsdf").GetConnectedSources()[0]]
+        parts = [mixed.source.GetInput(name).GetConnectedSources()[0][0].source for name in ("fg", "bg")]
+        assert [part.GetPrim().GetName() for part in parts] == ["part0_lobes", "part1_lobes"]
+        images = [prim.GetAttribute("inputs:file") for prim in stage.Traverse() if prim.HasAttribute("inputs:file")]
+        assert {each.Get().path for each in images} == {"./mask.png"} and len(images) == 2
+        assert {each.GetColorSpace() for each in images} == {"lin_rec709"}
+        assert "generalized_schlick_bsdf(" in generated(document(as_materialx(stage)), "essl")
+    stage = Usd.Stage.Open(str(package))
+    stage.GetDefaultPrim().GetVariantSet("surface").SetVariantSelection("lobes")
+    files = [prim.GetAttribute("inputs:file").Get() for prim in stage.Traverse() if prim.HasAttribute("inputs:file")]
+    assert files and all(each.resolvedPath.startswith(f"{package}[") for each in files)
+
+    without = vt.export(rough, "usd", folder=tmp_path)
+    assert "Without a graph of the lobes: mtlx: a graph has no tables" in without.text
+    assert without.facts["lobes"]["left_out"].startswith("mtlx: a graph has no tables")
+
+
+def test_a_stack_comes_back_from_any_variant(tmp_path: Path) -> None:
+    """Expected: the stack where a program has chosen the lobes; once OpenPBR is changed, the stack of that."""
+    path = saved(GOLD, tmp_path)
+    stage = Usd.Stage.Open(Sdf.Layer.OpenAsAnonymous(str(path)))
+    assert stage.GetDefaultPrim().GetVariantSet("surface").SetVariantSelection("lobes")
+    stage.GetRootLayer().Export(str(tmp_path / "b.usda"))
+    assert vt.imports.read(tmp_path / "b.usda").stack == GOLD
+    other = vt.imports.read(loosened(tmp_path / "b.usda")).stack
+    assert other != GOLD and other.kinds == GOLD.kinds
 
 
 def test_a_package_has_its_images_inside(painted: vt.Stack, tmp_path: Path) -> None:

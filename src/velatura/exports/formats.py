@@ -101,8 +101,8 @@ def export(
             "three" and "babylon", modules with a material for three.js and Babylon.js; "godot", a material of Godot 4;
             "json", the material with its numbers; "mitsuba-xml", a scene to be included; "python", a script that
             renders it; "bsdf", a measurement that Mitsuba's plugin `measured` loads; "bsdf-xml", matrices for WINDOW
-            and Radiance; fitted parameters in "openpbr", "gltf", "gltf-coat", "usd" (OpenPBR and UsdPreviewSurface),
-            "blender-principled" or "mitsuba-principled".
+            and Radiance; fitted parameters in "openpbr", "gltf", "gltf-coat", "usd" (OpenPBR and UsdPreviewSurface, and
+            the lobes' graph), "blender-principled" or "mitsuba-principled".
         model: a named model or its name (None for the default), its choices changed by `switches`.
         constant: for shaders, flat names of values that never change (`layer0_eta`), or ["all"].
         prefix: for shaders, begins all names in the code, so that one program may hold several materials; "vt" by

@@ -16,19 +16,39 @@ from velatura.exports.request import Export, Request, origin, relative, stated
 from velatura.model import Model
 from velatura.programs import xml
 from velatura.shader import closures, mixture
+from velatura.shader.closures import Loss
 from velatura.shader.material import constant as as_constant
 from velatura.shader.material import identifier, place, title
 from velatura.shader.printers import mtlx
 from velatura.shader.printers.nodes import Node, NodeGraph, constant
 from velatura.shader.program import described
 from velatura.shader.recorder import recording
-from velatura.stack import Address, Stack, Varying
+from velatura.stack import Address, Described, Stack, Varying
 from velatura.stack.flat_names import prefix
 
 LINE = 110  # characters of comments
 
 
 def write(request: Request) -> Export:
+    """The document of a material, with its loss.
+
+    Raises:
+        InvalidInput: as `document`.
+    """
+    made = document(request)
+    return Export(made.text, facts={"loss": stated(made.losses)})
+
+
+@dataclass(frozen=True)
+class Document:
+    """A document of MaterialX, the remarks on its lobes and on their loss, and that loss."""
+
+    text: str
+    remarks: Sequence[str]
+    losses: Sequence[Loss]
+
+
+def document(request: Request) -> Document:
     """The node of each stack, its graphs, and a material that uses it, or mixes those of several.
 
     Raises:
@@ -49,12 +69,14 @@ def write(request: Request) -> Export:
     masks = {f"m.{place(at)}": node for at, node in mtlx.varying(nodes, weights.items(), file).items()}
     constant = [at.name for at, x in weights.items() if not isinstance(x, Varying)]
     bsdf = mtlx.mixed(nodes, lobes, mixture.shares(material, constant), masks)
-    about = _about(request, [part.model for part in parts])
+    by = " and ".join(dict.fromkeys(described(part.model) for part in parts))
+    about = f"{title(material)}, by the model {by}; MaterialX."
+    remarks = [*wrap(_about(material), LINE), *(f"  {loss}" for loss in losses)]
     lines = [
         '<?xml version="1.0"?>',
         '<materialx version="1.39" colorspace="lin_rec709">',
-        *xml.comment([*about, *(f"  {loss}" for loss in losses)]),
-        *(line for part in parts for line in part.defined(about[0])),
+        *xml.comment([about, origin(), *remarks]),
+        *(line for part in parts for line in part.defined(about)),
         *(line.removeprefix("  ") for line in nodes.lines),
         f'  <surface name="{name}_surface" type="surfaceshader">',
         f'    <input name="bsdf" type="BSDF" {bsdf.where} />',
@@ -65,7 +87,7 @@ def write(request: Request) -> Export:
         "</materialx>",
         "",
     ]
-    return Export("\n".join(lines), facts={"loss": stated(losses)})
+    return Document("\n".join(lines), remarks, losses)
 
 
 @dataclass(frozen=True)
@@ -111,19 +133,16 @@ class _Part:
         return f"velatura_lobes_{self.name}"
 
 
-def _about(request: Request, models: Sequence[Model]) -> list[str]:
-    material, varying = request.material, not all(recording.is_uniform(stack) for _, stack in request.material.leaves())
+def _about(material: Described) -> str:
+    varying = not all(recording.is_uniform(stack) for _, stack in material.leaves())
     over = "computed from the values of layers, which are inputs" if varying else "polynomials of the direction of view"
-    text = (
+    return (
         f"Weights and roughnesses of its lobes are {over}. All targets but genosl are taken to return the light that"
         " facets block."
         f"{' It looks alike from both sides.' * any(stack.transmits for _, stack in material.leaves())}"
         f" Difference of its closures from the model{', where textures are half bright' * varying}, in light from"
         " above, as total variation and as the greatest difference of albedo:"
     )
-    by = " and ".join(dict.fromkeys(map(described, models)))
-    name = f"{title(material)}, by the model {by}; MaterialX."
-    return [name, origin(), *wrap(text, LINE)]
 
 
 def _input(stack: Stack, at: Address, value: Any) -> str:

@@ -1,21 +1,23 @@
-"""A material of USD: OpenPBR as a network of MaterialX, and UsdPreviewSurface for what does not read that; as a .usdz
-with its images inside."""
+"""A material of USD: OpenPBR, or in other variants the lobes, as networks of MaterialX, and UsdPreviewSurface for
+programs that do not read these; as a .usdz with its images inside."""
 
 from __future__ import annotations
 
 import tempfile
 from collections.abc import Iterator
+from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
 from xml.etree import ElementTree
+from xml.etree.ElementTree import Element
 
 from velatura.errors import InvalidInput, needs
-from velatura.exports import baked
-from velatura.exports.request import Export, Request
+from velatura.exports import baked, mtlx
+from velatura.exports.request import Export, Request, relative, stated
 from velatura.programs.fit import TARGETS
-from velatura.programs.program import Bake
 from velatura.programs.usd import write as usd
-from velatura.programs.usd.write import ROOT, Shader, quoted
+from velatura.programs.usd.write import CHOSEN, ROOT, Given, Graph, Shader, quoted
+from velatura.shader.material import identifier
 
 #: Types of MaterialX in USD.
 TYPES = {
@@ -24,32 +26,61 @@ TYPES = {
     "boolean": "bool",
     "string": "string",
     "filename": "asset",
+    "vector2": "float2",
     "vector3": "float3",
     "color3": "color3f",
     "color4": "color4f",
+    "BSDF": "token",
     "surfaceshader": "token",
+}
+LOBES = {"lobes": "", "lobes_osl": "genosl"}  # variants of the lobes, and the targets of MaterialX
+ABOUT = (
+    "The lobes as a graph of closures: variant lobes, and lobes_osl for renderers whose facets lose the light that they"
+    " block, as those of MaterialX's target genosl."
+)
+OUTPUTS = (
+    f"mtlx:surface.connect = <{ROOT}/surface.outputs:out>",
+    f"surface.connect = <{ROOT}/preview.outputs:surface>",
+)
+FRAME = ("normal", "tangent")  # inputs of graphs of lobes, which have defaults in MaterialX
+BY_INPUT = ("extract", "dotproduct")  # nodes whose definitions are named by the type that they take
+#: Definitions that are named otherwise, by node and type.
+NAMED = {
+    ("add", "BSDF"): "ND_add_bsdf",
+    ("mix", "BSDF"): "ND_mix_bsdf",
+    ("multiply", "BSDF"): "ND_multiply_bsdfC",
+    ("surface", "surfaceshader"): "ND_surface",
 }
 
 
 def write(request: Request) -> Export:
-    """The layer, with the loss of both surfaces."""
+    """The layer, with the loss of all surfaces."""
     shown, plain = (baked.fitted(request, target) for target in ("openpbr", request.to))
-    text = _layer(request, shown, plain, request.folder)
-    apart = partial(_packed, _layer(request, shown, plain, None))  # names its images wherever it lies
     facts = {**baked.facts(shown), "preview": baked.facts(plain)}
-    return Export(text, notes=(*shown.summary, *plain.summary), binary={".usdz": apart}, facts=facts)
+    lobes: mtlx.Document | None = None
+    try:
+        lobes = mtlx.document(replace(request, folder=None))
+        remarks = [ABOUT, *lobes.remarks]
+        facts["lobes"] = {"loss": stated(lobes.losses)}
+    except InvalidInput as reason:
+        remarks = [f"Without a graph of the lobes: {reason}"]
+        facts["lobes"] = {"left_out": str(reason)}
+    notes = (*shown.summary, *plain.summary, *remarks)
 
+    def layer(folder: Path | None) -> str:
+        """The text, which names images relative to a folder, if there is one."""
+        material = baked.held(request)
+        graph = TARGETS["openpbr"].text(shown, material, baked.files(shown, None))
+        variants = {CHOSEN: list(_Network(graph, folder).shaders())}
+        if lobes:
+            begin = f"{identifier(request.material)}_"
+            variants |= {name: list(_Network(lobes.text, folder, begin, to).shaders()) for name, to in LOBES.items()}
+        head = [*shown.comment, "", *plain.summary, "", *remarks]
+        surface = usd.preview(plain, baked.files(plain, folder))
+        return usd.document(shown.name, head, material, surface, OUTPUTS, variants)
 
-def _layer(request: Request, shown: Bake, plain: Bake, folder: Path | None) -> str:
-    """The text of the layer, which names images relative to a folder, if there is one."""
-    material = baked.held(request)
-    graph = TARGETS["openpbr"].text(shown, material, baked.files(shown, folder))
-    shaders = [*_shaders(graph), *usd.preview(plain, baked.files(plain, folder))]
-    outputs = [
-        f"mtlx:surface.connect = <{ROOT}/surface.outputs:out>",
-        f"surface.connect = <{ROOT}/preview.outputs:surface>",
-    ]
-    return usd.document(shown.name, [*shown.comment, "", *plain.summary], material, shaders, outputs)
+    # A package names its images wherever it lies
+    return Export(layer(request.folder), notes=notes, binary={".usdz": partial(_packed, layer(None))}, facts=facts)
 
 
 def _packed(text: str) -> bytes:
@@ -68,25 +99,78 @@ def _packed(text: str) -> bytes:
         return package.read_bytes()
 
 
-def _shaders(graph: str) -> Iterator[Shader]:
-    """The nodes of a document of MaterialX, but its material."""
-    for node in ElementTree.fromstring(graph):
-        if node.tag == "surfacematerial":
-            continue
-        kind = node.attrib["type"]
-        inputs = {each.attrib["name"]: (TYPES[each.attrib["type"]], _given(each)) for each in node}
-        # Most definitions are named by what they give, and that of a channel by what it takes
-        of = node[0].attrib["type"] if node.tag == "extract" else kind
-        yield Shader(node.attrib["name"], f"ND_{node.tag}_{of}", inputs, {"out": TYPES[kind]})
+@dataclass(frozen=True)
+class _Network:
+    """A document of MaterialX as shaders in USD: its text; the folder of the layer, if there is one; how names begin
+    there that have no beginning here; the target of the graphs that nodes of its own are."""
+
+    text: str
+    folder: Path | None
+    begin: str = ""
+    target: str = ""
+
+    def shaders(self) -> Iterator[Shader | Graph]:
+        """The nodes of the document but its material."""
+        root = ElementTree.fromstring(self.text)
+        own = {each.attrib["node"]: each for each in root.iter("nodedef")}
+        graphs = {
+            each.attrib["nodedef"]: each for each in root.iter("nodegraph") if each.get("target", "") == self.target
+        }
+        if own:
+            world = {"space": ("string", quoted("world"))}
+            yield from (Shader(name, f"ND_{name}_vector3", {**world}, {"out": "float3"}) for name in FRAME)
+        for node in root:
+            if node.tag in own:
+                definition = own[node.tag]
+                yield self._graph(node, definition, graphs[definition.attrib["name"]])
+            elif node.tag not in ("nodedef", "nodegraph", "surfacematerial"):
+                yield self._shader(node)
+
+    def _shader(self, node: Element) -> Shader:
+        inputs = {each.attrib["name"]: self._port(each) for each in node}
+        return Shader(self._name(node), _definition(node), inputs, {"out": TYPES[node.attrib["type"]]})
+
+    def _graph(self, node: Element, definition: Element, graph: Element) -> Graph:
+        """A node as a graph with the inputs of its definition."""
+        given = {each.attrib["name"]: each for each in node}
+        inputs = {}
+        for each in definition.iter("input"):
+            name = each.attrib["name"]
+            kind = TYPES[each.attrib["type"]]
+            inputs[name] = (kind, (name, "out")) if name in FRAME else self._port(given.get(name, each))
+        shaders = [self._shader(each) for each in graph if each.tag != "output"]
+        outputs = {each.attrib["name"]: self._port(each) for each in graph.iter("output")}
+        return Graph(self._name(node), inputs, outputs, shaders)
+
+    def _name(self, node: Element, key: str = "name") -> str:
+        return node.attrib[key].removeprefix(self.begin)
+
+    def _port(self, entry: Element) -> tuple[str, Given]:
+        """The type of an input or output, and its value or what it is connected to."""
+        kind = TYPES[entry.attrib["type"]]
+        if "nodename" in entry.attrib:
+            return kind, (self._name(entry, "nodename"), "out")
+        if "interfacename" in entry.attrib:
+            return kind, ("", entry.attrib["interfacename"])
+        value = entry.attrib["value"]
+        if kind == "asset":
+            space = entry.get("colorspace")
+            file = usd.asset(relative(Path(value), self.folder))
+            return kind, file + (f" (colorSpace = {quoted(space)})" if space else "")
+        if kind == "string":
+            return kind, quoted(value)
+        return kind, f"({value})" if "," in value else value
 
 
-def _given(entry: ElementTree.Element) -> str | tuple[str, str]:
-    if "nodename" in entry.attrib:
-        return entry.attrib["nodename"], "out"
-    value, kind = entry.attrib["value"], entry.attrib["type"]
-    if kind == "filename":
-        space = entry.attrib.get("colorspace")
-        return usd.asset(value) + (f" (colorSpace = {quoted(space)})" if space else "")
-    if kind == "string":
-        return quoted(value)
-    return f"({value})" if "," in value else value
+def _definition(node: Element) -> str:
+    """The name of a node's definition in the libraries of MaterialX, by the types that it takes and gives."""
+    tag, kind, taken = node.tag, node.attrib["type"], [each.attrib["type"] for each in node]
+    if tag.endswith("_bsdf") or (tag, kind) in NAMED:
+        return NAMED.get((tag, kind), f"ND_{tag}")
+    if tag in BY_INPUT:
+        kind = taken[0]
+    elif tag == "convert":
+        kind = f"{taken[0]}_{kind}"
+    elif taken == [kind, "float"] and kind != "float":
+        kind += "FA"
+    return f"ND_{tag}_{kind}"

@@ -15,7 +15,7 @@ from velatura.programs import embedded
 from velatura.programs.imported import Imported, Left, Notes
 from velatura.programs.materialx import closures
 from velatura.programs.materialx import read as materialx
-from velatura.programs.usd.write import Given, Shader, asset, digest, number, quoted
+from velatura.programs.usd.write import CHOSEN, SURFACES, Given, Shader, asset, digest, number, quoted
 from velatura.programs.xml import Element
 from velatura.stack import loads
 
@@ -94,6 +94,9 @@ def _reader(stage: Any, shade: Any, place: str, path: Path, elsewhere: list[str]
         if elsewhere:
             notes.add("references", f"{len(elsewhere)}", ELSEWHERE)
         with _blamed(path):
+            surfaces = prim.GetVariantSet(SURFACES)
+            if prim.GetCustomDataByKey(embedded.KEY) and CHOSEN in surfaces.GetVariantNames():
+                surfaces.SetVariantSelection(CHOSEN)  # of others the stack is not read
             name, stack = prim.GetDisplayName() or prim.GetName(), prim.GetCustomDataByKey(embedded.KEY)
             surface, network = _network(shade, prim, path)
         held = _held(stack, path, network)

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from itertools import chain
 from pathlib import Path
 from typing import Any, TypeAlias
 
@@ -40,10 +41,13 @@ def start(surface: Surface) -> Fitted:
 # Text ----------------------------------------------------------------------------------------------------------------
 
 
-#: A value as text, or the name of a shader and of its output.
+#: A value as text, or the name of a shader and of its output; without the former, that of an input of its graph.
 Given: TypeAlias = "str | tuple[str, str]"
+Ports: TypeAlias = "dict[str, tuple[str, Given]]"  #: types and values of inputs or outputs, by name
 
 ROOT = "/material"
+SURFACES = "surface"  # the set of variants
+CHOSEN = "openpbr"  # that variant of it which renderers take if none is named, and from which a stack is read
 
 
 @dataclass(frozen=True)
@@ -52,21 +56,50 @@ class Shader:
 
     name: str
     identifier: str
-    inputs: dict[str, tuple[str, Given]]
+    inputs: Ports
     outputs: dict[str, str]
 
-    @property
-    def lines(self) -> list[str]:
-        """Its text, indented within a material."""
-        inputs = [
-            f"{kind} inputs:{name} = {value}"
-            if isinstance(value, str)
-            else f"{kind} inputs:{name}.connect = <{ROOT}/{value[0]}.outputs:{value[1]}>"
-            for name, (kind, value) in self.inputs.items()
-        ]
+    def lines(self, root: str) -> list[str]:
+        """Its text, below a path."""
         outputs = [f"{kind} outputs:{name}" for name, kind in self.outputs.items()]
-        body = [f"uniform token info:id = {quoted(self.identifier)}", *inputs, *outputs]
-        return [f"    def Shader {quoted(self.name)}", "    {", *(f"        {each}" for each in body), "    }", ""]
+        body = [f"uniform token info:id = {quoted(self.identifier)}", *_ports("inputs", self.inputs, root), *outputs]
+        return _block([f"def Shader {quoted(self.name)}", "{"], body)
+
+
+@dataclass(frozen=True)
+class Graph:
+    """Shaders that are one node of a network: its name, its inputs and outputs, and what lies in it."""
+
+    name: str
+    inputs: Ports
+    outputs: Ports
+    shaders: Sequence[Shader]
+
+    def lines(self, root: str) -> list[str]:
+        """Its text, below a path."""
+        inside = f"{root}/{self.name}"
+        ports = [*_ports("inputs", self.inputs, root), *_ports("outputs", self.outputs, inside)]
+        return _block([f"def NodeGraph {quoted(self.name)}", "{"], [*ports, "", *_all(self.shaders, inside)])
+
+
+def _ports(side: str, ports: Ports, root: str) -> Iterator[str]:
+    """Lines of inputs or outputs, which are connected to shaders below a path, or to its own inputs."""
+    for name, (kind, value) in ports.items():
+        if isinstance(value, str):
+            yield f"{kind} {side}:{name} = {value}"
+        else:
+            shader, port = value
+            source = f"{root}/{shader}.outputs:{port}" if shader else f"{root}.inputs:{port}"
+            yield f"{kind} {side}:{name}.connect = <{source}>"
+
+
+def _all(shaders: Iterable[Shader | Graph], root: str) -> Iterator[str]:
+    return (line for each in shaders for line in each.lines(root))
+
+
+def _block(head: Sequence[str], body: Iterable[str]) -> list[str]:
+    """Lines in the brace that a head ends with, and an empty one."""
+    return [*head, *(f"    {line}" if line else "" for line in body), "}", ""]
 
 
 def quoted(text: str) -> str:
@@ -87,7 +120,7 @@ def number(value: float | tuple[float, ...]) -> str:
 
 def preview(made: Bake, files: dict[str, str]) -> list[Shader]:
     """The shaders of UsdPreviewSurface, the surface first."""
-    inputs: dict[str, tuple[str, Given]] = {
+    inputs: Ports = {
         each.name: ("color3f" if each.is_colour else "float", number(value))
         for each, value in made.differing(PARAMETERS)
     }
@@ -95,7 +128,7 @@ def preview(made: Bake, files: dict[str, str]) -> list[Shader]:
     for name, image in made.images.items():  # of the base's colour alone
         space = "sRGB" if image.texture.encoding == "srgb" else "raw"
         scale = number((*rgb(image.factor), 1.0))
-        read: dict[str, tuple[str, Given]] = {
+        read: Ports = {
             "file": ("asset", asset(files[name])),
             "sourceColorSpace": ("token", quoted(space)),
             "wrapS": ("token", '"repeat"'),
@@ -112,10 +145,34 @@ def preview(made: Bake, files: dict[str, str]) -> list[Shader]:
 
 
 def document(
-    name: str, remarks: Sequence[str], material: Any, shaders: Sequence[Shader], outputs: Sequence[str]
+    name: str,
+    remarks: Sequence[str],
+    material: Any,
+    shaders: Sequence[Shader],
+    outputs: Sequence[str],
+    variants: Mapping[str, Sequence[Shader | Graph]] | None = None,
 ) -> str:
-    """A layer with one material, which holds the stack."""
-    held = json.dumps({"digest": digest(shaders), "material": material}, ensure_ascii=False)
+    """A layer with one material, which holds the stack; `variants` have further shaders, those of `CHOSEN` by
+    default."""
+    variants = variants or {}
+    known = [each for each in (*variants.get(CHOSEN, ()), *shaders) if isinstance(each, Shader)]
+    held = json.dumps({"digest": digest(known), "material": material}, ensure_ascii=False)
+    body = [
+        'uniform string config:mtlx:version = "1.39"',
+        *(f"token outputs:{each}" for each in outputs),
+        "",
+        *_all(shaders, ROOT),
+    ]
+    chosen: list[str] = []
+    if variants:
+        chosen = [
+            "    variants = {",
+            f"        string {SURFACES} = {quoted(CHOSEN)}",
+            "    }",
+            f"    prepend variantSets = {quoted(SURFACES)}",
+        ]
+        each = (_block([f"{quoted(name)} {{"], _all(own, ROOT)) for name, own in variants.items())
+        body += _block([f"variantSet {quoted(SURFACES)} = {{"], chain.from_iterable(each))
     return "\n".join(
         [
             "#usda 1.0",
@@ -133,14 +190,9 @@ def document(
             "    customData = {",
             f"        string {embedded.KEY} = {quoted(held)}",
             "    }",
+            *chosen,
             ")",
-            "{",
-            '    uniform string config:mtlx:version = "1.39"',
-            *(f"    token outputs:{each}" for each in outputs),
-            "",
-            *(line for each in shaders for line in each.lines),
-            "}",
-            "",
+            *_block(["{"], body),
         ]
     )
 

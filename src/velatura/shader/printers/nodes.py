@@ -31,7 +31,7 @@ class Node(NamedTuple):
 
 
 def constant(kind: str, *numbers: float) -> Node:
-    return Node(kind, f'value="{", ".join(f"{x:.7g}" for x in numbers)}"')
+    return Node(kind, f'value="{", ".join(f"{x:.9g}" for x in numbers)}"')
 
 
 def string(text: str) -> Node:
