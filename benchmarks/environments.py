@@ -2,7 +2,9 @@
 
 three.js draws in headless Chromium, NumPy the samples, as many of the model's as of the environment's. For each preset
 and environment: the root mean square of the difference as displays have it, sRGB from 0 to 1, with the exposure that
-brings the mean to .25. Noise of the samples is in it. Prints the table of docs/how-to/engines.md.
+brings the mean to .25. Pixels whose centres lie within a thousandth of the radius of the edge are left out: there the
+mesh's interpolated normals are not the ball's. Noise of the samples is in it. Prints the table of
+docs/how-to/engines.md.
 
     python benchmarks/environments.py [--presets bare-gold,...] [--environments studio,...] [--samples 768]
 """

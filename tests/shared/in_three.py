@@ -28,6 +28,7 @@ from velatura.stack import Material, MaterialLike
 Array = NDArray[np.floating]
 
 RADIUS = 0.98
+EDGE = 0.999  # of the radius: nearer to the edge, interpolated normals of a mesh are not those of the sphere
 ADDRESS = "http://engine.test/"
 
 DRAW = """
@@ -217,11 +218,11 @@ def radiance(sky: Array) -> bytes:
 
 
 def sampled(material: MaterialLike, skies: Sequence[Array], size: int, samples: int, tilt: float = 0.0) -> list[Array]:
-    """The same ball under each of some environments, by means of so many samples of the model for each pixel, in
-    NumPy."""
+    """The same ball but for its `EDGE`, under each of some environments, by means of so many samples of the model for
+    each pixel, in NumPy."""
     across = (np.arange(size) + 0.5) / size * 2 - 1
     x, y = across / RADIUS, -across[:, None] / RADIUS
-    inside = x**2 + y**2 < 1
+    inside = x**2 + y**2 < EDGE**2
     x, y = np.broadcast_to(x, inside.shape)[inside], np.broadcast_to(y, inside.shape)[inside]
     n = np.stack([x, y, np.sqrt(1 - x**2 - y**2)])
 

@@ -92,8 +92,8 @@ OPERATIONS: dict[str, Callable[..., Array]] = {
     "atan2": np.arctan2,
     "absval": np.abs,
     "clamp": np.clip,
-    "ifgreater": lambda a, b, yes, no: np.where(a > b, yes, no),
-    "ifgreatereq": lambda a, b, yes, no: np.where(a >= b, yes, no),
+    "ifgreater": lambda a, b, *of: _chosen(a > b, *of),
+    "ifgreatereq": lambda a, b, *of: _chosen(a >= b, *of),
     "convert": lambda x: x if np.ndim(x) > 1 else _stacked(x, x, x),
     "combine2": lambda *each: _stacked(*each),
     "combine3": lambda *each: _stacked(*each),
@@ -101,6 +101,10 @@ OPERATIONS: dict[str, Callable[..., Array]] = {
     "dotproduct": lambda a, b: np.sum(a * b, axis=0),
     "crossproduct": lambda a, b: np.cross(a, b, axis=0),
 }
+
+
+def _chosen(holds: NDArray[np.bool_], one: Array, other: Array) -> Array:
+    return np.asarray(np.where(holds, one, other))
 
 
 def _stacked(*each: Array) -> Array:

@@ -6,6 +6,7 @@ import functools
 import shutil
 import sys
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -164,13 +165,25 @@ def connected(entry: Any, port: Any) -> None:
         entry.setNodeName(name)
 
 
-@pytest.mark.parametrize("stack", [GOLD, BRUSHED, PANE], ids=lambda stack: str(stack.kinds))
-def test_lobes_in_usd_have_the_values_of_the_closures(stack: vt.Stack, tmp_path: Path) -> None:
+@pytest.fixture
+def fitted_as_gold(monkeypatch: pytest.MonkeyPatch) -> None:
+    """All materials have the parameters of one, beside lobes of their own."""
+
+    def bake(stack: Any, target: str, *_: Any, **options: Any) -> Any:
+        return replace(_fitted(GOLD, target, named("velatura"), **options), name=stack.name)
+
+    monkeypatch.setattr(baked, "bake", bake)
+
+
+@pytest.mark.parametrize(("stack", "model"), [(GOLD, "velatura"), (BRUSHED, "velatura"), (PANE, "weier2020")])
+def test_lobes_in_usd_have_the_values_of_the_closures(
+    stack: vt.Stack, model: str, tmp_path: Path, fitted_as_gold: None
+) -> None:
     """Expected: weights and roughnesses at directions, of what OpenUSD reads, as the polynomials have them in NumPy; of
     facets that return what they block, and in the variant for OSL of facets that lose it. Constants have single
     precision. Generators make code of it.
     """
-    path = saved(stack, tmp_path)
+    path = vt.export(stack, "usd", model).save(tmp_path / "a.usda")[0]
     rng = np.random.default_rng(4)
     z, phi = rng.uniform(0.1, 1, 9), rng.uniform(0, 2 * np.pi, 9)
     wi = np.stack([np.sqrt(1 - z * z) * np.cos(phi), np.sqrt(1 - z * z) * np.sin(phi), z])
@@ -190,7 +203,7 @@ def test_lobes_in_usd_have_the_values_of_the_closures(stack: vt.Stack, tmp_path:
                 graph.addOutput(f"roughness{k}", "vector2").setNodeName(lobe.getInput("roughness").getNodeName())
             graph.addOutput(f"weight{k}", "color3").setNodeName(weight.getNodeName())
         found = evaluated(graph, given)
-        fit = PolynomialFit(tabulated(Material.of(stack), named("velatura"), conserving=variant == "lobes"))
+        fit = PolynomialFit(tabulated(Material.of(stack), named(model), conserving=variant == "lobes"))
         expected = fit.above(tuple(wi))
         assert len(expected) == len(lobes)
         for k, closure in enumerate(expected):
@@ -199,7 +212,7 @@ def test_lobes_in_usd_have_the_values_of_the_closures(stack: vt.Stack, tmp_path:
                 np.testing.assert_allclose(found[f"roughness{k}"], np.stack(closure.roughness[:2]), atol=1e-3)
 
 
-def test_lobes_of_mixtures_and_images_are_in_usd_as_well(tmp_path: Path) -> None:
+def test_lobes_of_mixtures_and_images_are_in_usd_as_well(tmp_path: Path, fitted_as_gold: None) -> None:
     """Expected: a graph for each stack, whatever the material is called, mixed by a mask; images relative to the layer,
     and inside a package. Where a graph has no lobes the layer says why."""
     vt.scenes.write_image(np.full((4, 4, 3), 0.5, np.float32), tmp_path / "mask.png")
