@@ -6,6 +6,7 @@ import functools
 import io
 import json
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -31,6 +32,7 @@ from velatura.stack import Texture
 
 once = functools.cache(bake)
 Run = Callable[..., tuple[int, str, str]]
+NO_USD = 'usd-core is missing: pip install "velatura[usd]"'
 
 COPPER = vt.Stack([vt.Interface(eta=(0.28, 0.48, 1.08), k=(3.6, 2.6, 2.4), alpha=0.2)])
 PAINT = vt.Stack([vt.Interface(eta=1.5, alpha=0.05), vt.Diffuse(albedo=(0.7, 0.2, 0.1))])
@@ -170,10 +172,13 @@ def test_png_is_read_by_others(channels: int) -> None:
 
 
 @pytest.mark.parametrize(
-    ("target", "ending"), [("openpbr", ".mtlx"), ("gltf", ".gltf"), ("mitsuba-principled", ".xml")]
+    ("target", "ending"),
+    [("openpbr", ".mtlx"), ("usd", ".usda"), ("gltf", ".gltf"), ("mitsuba-principled", ".xml")],
 )
 def test_files_are_read_back(worn: vt.Mix, target: str, ending: str, tmp_path: Path) -> None:
     """Expected: the material itself; without it a mixture by the image of metalness, which is the mask."""
+    if target == "usd":
+        pytest.importorskip("pxr", reason=NO_USD)
     path, *beside = vt.export(worn, target, maps=16, folder=tmp_path).save(tmp_path / f"worn{ending}")
     assert {each.parent for each in beside} == {tmp_path}
     assert all(each.name.isascii() and ("'" not in each.name) for each in beside)
@@ -214,6 +219,26 @@ def test_other_sizes_are_refused(size: Any, worn: vt.Mix) -> None:
         bake(worn, "gltf", maps=size)
 
 
-def test_a_program_without_baked_images_refuses_them(worn: vt.Mix) -> None:
+def test_a_program_without_baked_images_refuses_them(worn: vt.Mix, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(TARGETS, "usd", replace(TARGETS["usd"], maps={}))
     with pytest.raises(vt.InvalidInput, match=r"maps: only for openpbr, gltf, gltf-coat, .*, not for usd"):
         bake(worn, "usd", maps=16)
+
+
+def test_surfaces_of_usd_have_their_own_images(worn: vt.Mix, tmp_path: Path) -> None:
+    """Expected: of both surfaces, files beside the layer, and inside a package; colours in sRGB, all else as it is."""
+    pxr = pytest.importorskip("pxr.Usd", reason=NO_USD)
+    made = vt.export(worn, "usd", maps=16, folder=tmp_path)
+    layer, package = made.save(tmp_path / "worn.usda")[0], made.save(tmp_path / "worn.usdz")[0]
+    stage = pxr.Stage.Open(str(layer))
+    read = {prim.GetName(): prim for prim in stage.Traverse() if prim.HasAttribute("inputs:file")}
+    assert {"base_color_image", "base_metalness_image"} <= set(read)
+    spaces = {"diffuseColor_preview": "sRGB", "metallic_preview": "raw", "roughness_preview": "raw"}
+    for name, space in spaces.items():
+        assert read[name].GetAttribute("inputs:sourceColorSpace").Get() == space
+    paths = {prim.GetAttribute("inputs:file").Get() for prim in read.values()}
+    assert all(Path(each.resolvedPath).parent == tmp_path and each.path.startswith("./") for each in paths)
+    stage = pxr.Stage.Open(str(package))
+    inside = [prim.GetAttribute("inputs:file").Get() for prim in stage.Traverse() if prim.HasAttribute("inputs:file")]
+    assert len(inside) == len(read)
+    assert all(each.resolvedPath.startswith(f"{package}[") for each in inside)

@@ -20,11 +20,8 @@ from velatura.stack import dumps
 
 def write(request: Request) -> Export:
     """The file of the program that has the format's name."""
-    made, program = fitted(request, request.to), TARGETS[request.to]
-    apart: dict[Path, bytes] = {}
-    if made.maps:
-        folder = request.folder or Path()
-        made, apart = _placed(made, folder.resolve() if program.anywhere else folder)
+    program = TARGETS[request.to]
+    made, apart = placed(fitted(request, request.to), request)
     text = program.text(made, held(request), files(made, None if program.anywhere else request.folder))
     return Export(text, notes=tuple(made.summary), apart=apart, facts=facts(made))
 
@@ -37,8 +34,12 @@ def fitted(request: Request, target: str) -> Bake:
     return bake(request.material, target, request.model, maps=maps, progress=request.progress or in_silence)
 
 
-def _placed(made: Bake, folder: Path) -> tuple[Bake, dict[Path, bytes]]:
-    """A bake whose images lie in a folder, and what is to be written there."""
+def placed(made: Bake, request: Request) -> tuple[Bake, dict[Path, bytes]]:
+    """A bake whose baked images lie in the folder of the request, and what is to be written there."""
+    if not made.maps:
+        return made, {}
+    folder = request.folder or Path()
+    folder = folder.resolve() if TARGETS[made.target].anywhere else folder
     images, apart = {}, {}
     for name, image in made.images.items():
         path = folder / image.texture.texture.name

@@ -66,7 +66,7 @@ FORMATS: dict[str, Format] = {
     "bsdf": Format((".bsdf",), "velatura.exports.bsdf", is_text=False),
     "bsdf-xml": Format((".xml",), "velatura.exports.klems"),
     **{name: Format(baked.endings, "velatura.exports.baked", options=_MAPS) for name, baked in BAKED.items()},
-    "usd": Format(BAKED["usd"].endings, "velatura.exports.usd"),
+    "usd": Format(BAKED["usd"].endings, "velatura.exports.usd", options=_MAPS),
     **{
         name: Format(BAKED[name].endings, "velatura.exports.gltf", options=_MAPS | {"mesh"})
         for name in ("gltf", "gltf-coat")

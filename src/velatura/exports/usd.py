@@ -15,6 +15,7 @@ from velatura.errors import InvalidInput, needs
 from velatura.exports import baked, mtlx
 from velatura.exports.request import Export, Request, relative, stated
 from velatura.programs.fit import TARGETS
+from velatura.programs.program import Bake
 from velatura.programs.usd import write as usd
 from velatura.programs.usd.write import CHOSEN, ROOT, Given, Graph, Shader, quoted
 from velatura.shader.material import identifier
@@ -67,7 +68,7 @@ def write(request: Request) -> Export:
         facts["lobes"] = {"left_out": str(reason)}
     notes = (*shown.summary, *plain.summary, *remarks)
 
-    def layer(folder: Path | None) -> str:
+    def layer(folder: Path | None, shown: Bake, plain: Bake) -> str:
         """The text, which names images relative to a folder, if there is one."""
         material = baked.held(request)
         graph = TARGETS["openpbr"].text(shown, material, baked.files(shown, None))
@@ -79,8 +80,11 @@ def write(request: Request) -> Export:
         surface = usd.preview(plain, baked.files(plain, folder))
         return usd.document(shown.name, head, material, surface, OUTPUTS, variants)
 
-    # A package names its images wherever it lies
-    return Export(layer(request.folder), notes=notes, binary={".usdz": partial(_packed, layer(None))}, facts=facts)
+    # A package names its images wherever they lie
+    packed = {".usdz": partial(_packed, layer(None, shown, plain))}
+    (shown, beside), (plain, others) = (baked.placed(each, request) for each in (shown, plain))
+    text = layer(request.folder, shown, plain)
+    return Export(text, notes=notes, binary=packed, apart={**beside, **others}, facts=facts)
 
 
 def _packed(text: str) -> bytes:

@@ -11,7 +11,7 @@ from typing import Any, TypeAlias
 
 from velatura.optics import fresnel
 from velatura.programs import embedded
-from velatura.programs.program import Bake, Fitted, Program, mean_alpha, product, rgb, roughness
+from velatura.programs.program import Bake, Fitted, Program, mean_alpha, own_maps, product, rgb, roughness
 from velatura.programs.surface import Surface
 from velatura.programs.usd import formulas
 from velatura.programs.usd.parameters import PARAMETERS
@@ -125,22 +125,27 @@ def preview(made: Bake, files: dict[str, str]) -> list[Shader]:
         for each, value in made.differing(PARAMETERS)
     }
     others = []
-    for name, image in made.images.items():  # of the base's colour alone
+    for name, image in made.images.items():
         space = "sRGB" if image.texture.encoding == "srgb" else "raw"
-        scale = number((*rgb(image.factor), 1.0))
+        if isinstance(image.factor, tuple):
+            scale, output, kind = (*image.factor, 1.0), "rgb", "color3f"
+        else:
+            scale, output, kind = (image.factor,) * 4, "rgba"[image.channel], "float"
         read: Ports = {
             "file": ("asset", asset(files[name])),
             "sourceColorSpace": ("token", quoted(space)),
             "wrapS": ("token", '"repeat"'),
             "wrapT": ("token", '"repeat"'),
-            "scale": ("float4", scale),
+            "scale": ("float4", number(scale)),
             "st": ("float2", ("coordinates", "result")),
         }
-        inputs[name] = ("color3f", ("image", "rgb"))
-        others = [
-            Shader("image", "UsdUVTexture", read, {"rgb": "float3"}),
-            Shader("coordinates", "UsdPrimvarReader_float2", {"varname": ("string", '"st"')}, {"result": "float2"}),
-        ]
+        inputs[name] = (kind, (f"{name}_preview", output))
+        others.append(
+            Shader(f"{name}_preview", "UsdUVTexture", read, {output: "float3" if output == "rgb" else "float"})
+        )
+    if others:
+        found: Ports = {"varname": ("string", quoted("st"))}
+        others.append(Shader("coordinates", "UsdPrimvarReader_float2", found, {"result": "float2"}))
     return [Shader("preview", "UsdPreviewSurface", inputs, {"surface": "token"}), *others]
 
 
@@ -218,4 +223,5 @@ PROGRAM = Program(
     pane=True,
     colour="diffuseColor",
     images=(".png", ".jpg", ".jpeg"),
+    maps=own_maps(PARAMETERS, without=("ior",)),
 )
