@@ -75,7 +75,7 @@ class AtWavelengths(InterfaceFilms):
     def _matrices(self, cos_1: Value, cos_2: Value) -> tuple[Mueller, Mueller]:
         found = self._response(self._cosine(cos_1, cos_2))
         passes = ops.select((cos_1 > 0) & (cos_2 > 0), 1.0, 0.0)
-        return self._matrix("reflected", found), self._matrix("transmitted", found).times_share(passes)
+        return self._matrix("reflected", found), self._matrix("transmitted", found) * passes
 
     def _matrix(self, name: str, found: Response) -> Mueller:
         return Mueller(*(self._colour(getattr(found, f"{name}_{part}")) for part in ("s", "p", "real", "imaginary")))

@@ -139,6 +139,11 @@ class Transport(Light):
         pairs = zip(self.columns, other.columns)
         return Transport(self.x, tuple(tuple(map(sum, zip(*columns))) for columns in pairs))
 
+    def after(self, first: Mueller) -> Transport:
+        """The matrix of a way that begins with another event, whose matrix is in the frame that this one began in."""
+        rows = [first.transposed.times(row) for row in zip(*self.columns)]
+        return Transport(self.x, tuple(zip(*rows)))
+
     def joined(self, w: Direction, other: Transport) -> list[Value]:
         """The matrix, row by row, of this way along w and on by the `other` one, which was followed from its far end
         and arrives along -w: for light that goes it the other way, the matrix is transposed, and signs of U change."""
@@ -149,6 +154,11 @@ class Transport(Light):
             for row in range(4)
             for column in met
         ]
+
+    def rows(self, w: Direction) -> list[Value]:
+        """The matrix, row by row, for frames whose x is `horizontal` at both ends, of light that travels along w."""
+        columns = self.along(w, horizontal(w)).columns
+        return [column[row] for row in range(4) for column in columns]
 
 
 def all_light(w: Direction, colour: Value) -> Transport:
@@ -193,15 +203,22 @@ class Mueller:
             u * self.imaginary + v * self.real,
         )
 
-    def then(self, other: Mueller) -> Mueller:
-        """Matrix of this one and then another in the same frame, as of surfaces that are parallel."""
+    def __mul__(self, other: Mueller | Value) -> Mueller:
+        """Matrix of this event and another in the same frame, as of parallel surfaces, in any order; or of a share of
+        the light."""
+        if not isinstance(other, Mueller):
+            return Mueller(*(other * part for part in vars(self).values()))
         real = self.real * other.real - self.imaginary * other.imaginary
         imaginary = self.real * other.imaginary + self.imaginary * other.real
         return Mueller(self.s * other.s, self.p * other.p, real, imaginary)
 
-    def plus(self, other: Mueller) -> Mueller:
+    def __add__(self, other: Mueller) -> Mueller:
         """Matrix of both together."""
-        return Mueller(self.s + other.s, self.p + other.p, self.real + other.real, self.imaginary + other.imaginary)
+        return Mueller(*map(sum, zip(vars(self).values(), vars(other).values())))
+
+    @property
+    def transposed(self) -> Mueller:
+        return Mueller(self.s, self.p, self.real, -self.imaginary)
 
     def repeated(self) -> Mueller:
         """Sum of all powers of the matrix, from 0 on: of light that goes round any number of times."""
@@ -211,10 +228,6 @@ class Mueller:
             *(ops.divide(1.0, 1 - part) for part in (self.s, self.p)),
             *(ops.divide(part, square) for part in (real, self.imaginary)),
         )
-
-    def times_share(self, share: Value) -> Mueller:
-        """Matrix of light of which a share is left."""
-        return Mueller(share * self.s, share * self.p, share * self.real, share * self.imaginary)
 
     def bounded(self, most: Value = 1.0) -> Mueller:
         """The nearest matrix that light can have, with up to `most` in the mean of s and p.

@@ -34,7 +34,7 @@ class ExactStack(LayeredStack):
     """
 
     def __init__(self, mi: Any, model: Model, binding: Binding) -> None:
-        settings = Settings(0, _MAX_DEPTH, model.microsurface, least_alpha=ALPHA_MIN, either_end=True, polarised=True)
+        settings = Settings(0, _MAX_DEPTH, model.microsurface, least_alpha=ALPHA_MIN, either_end=True)
         self.walked = WalkedStack(mi, settings, binding)
         super().__init__(mi, model, binding)
 

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from velatura import kernel
 from velatura.errors import whole_number
-from velatura.optics.polarisation import Polarisation, horizontal
+from velatura.optics.polarisation import Polarisation, horizontal, unpolarised
 from velatura.reference.layers import WalkedLayers, from_material, zeros
 from velatura.reference.walk import walk
 from velatura.stack import RGB, Address, Material, Stack
@@ -74,7 +74,8 @@ def _part(layers: WalkedLayers, wi: Array, count: int, seed: int, start: int, po
     rng = types.PCG32(count, types.UInt64(seed), types.UInt64(start))
     x, y, z = (dr.opaque(types.Float, float(component)) for component in wi)
     one = layers.start(types.Array3f(1))
-    path = walk(types, layers, (x, y, z), rng, one, max_depth=MAX_DEPTH, polarised=polarised)
+    light = unpolarised((-x, -y, -z), one) if polarised else None
+    path = walk(types, layers, (x, y, z), rng, one, max_depth=MAX_DEPTH, light=light)
     # Look at the ends
     carried = dr.select(path.alive, 0, path.weight)
     weight = layers.seen(carried, types.Array3f)

@@ -248,7 +248,7 @@ class WalkedLayers:
         for k in range(self.count):
             cosines.append(fresnel.cos_transmitted(cosines[k], relative_index(self.index[k], self.index[k + 1])))
         passed = Mueller(1.0, 1.0, 1.0, 0.0)
-        reflected = passed.times_share(0.0)
+        reflected = passed * 0.0
         for k in reversed(range(self.count)):
             above, below = self.index[k], self.index[k + 1]
             left = self.slabs[k + 1].straight(ops.divide(1.0, cosines[k + 1]))
@@ -257,12 +257,12 @@ class WalkedLayers:
                 reflected, passed = reflection, refraction
                 continue
             back, out = self.mueller(k, cosines[k + 1], below, above, False)
-            returned = reflected.times_share(left * left)
-            inside = refraction.then(back.then(returned).repeated())
-            reflected = reflection.plus(inside.then(returned).then(out))
-            passed = inside.then(passed).times_share(left)
+            returned = reflected * (left * left)
+            inside = refraction * (back * returned).repeated()
+            reflected = reflection + inside * returned * out
+            passed = inside * passed * left
         left = self.slabs[0].straight(ops.divide(1.0, cosine))
-        return reflected.times_share(left * left), passed.times_share(left)
+        return reflected * (left * left), passed * left
 
     def meet(
         self,

@@ -26,7 +26,7 @@ from velatura import ops
 from velatura.ops import Value
 from velatura.optics import ggx
 from velatura.optics.ggx import Direction
-from velatura.optics.polarisation import Light
+from velatura.optics.polarisation import Light, Mueller, Transport
 from velatura.reference import events, facets
 from velatura.reference.events import ScatteringEvent, SurfaceMeeting
 from velatura.reference.layers import WalkedLayers, WalkedSlab, pick
@@ -61,7 +61,8 @@ class WayOut:
     the sum of the densities of all strategies that draw more by the path, relative to this one's. `reverse` is the
     density with which a path from outside would draw w, over `density`. `back` are the ways by a reflection, of slab 1
     and those below it, for paths where `turns`; none where a medium lies outside. `light` is the polarised light that
-    the way, followed from outside, brings into each slab; none where polarisation is left out.
+    the way, followed from outside, brings to the top of each slab, and `light_down` to its bottom, over `up` and
+    `down`; none where polarisation is left out.
     """
 
     w: tuple[Direction, ...]
@@ -72,12 +73,13 @@ class WayOut:
     reverse: tuple[Value, ...]
     back: tuple[WayBack, ...] = ()
     turns: Value = False
-    light: tuple[Light | None, ...] = ()
+    light: tuple[Transport, ...] = ()
+    light_down: tuple[Transport, ...] = ()
 
     def along(self, slab: Value, back: bool) -> tuple[Direction, Light | None]:
         """Direction in which light leaves a slab, by the way back or straight, and what the way brings there."""
         if not back:
-            return _direction(self, slab), pick(self.light, slab)
+            return _direction(self, slab), pick(self.light, slab) if self.light else None
         way = _way_back_below(self, slab - 1)
         x, y, z = way.w
         return (-x, -y, -z), way.light
@@ -85,17 +87,14 @@ class WayOut:
 
 @dataclass(frozen=True)
 class _Crossing:
-    """One surface on the way: its transmittance, its reflectance from above and below, and the slabs there.
+    """What a surface on the way does to light where it and all before it are smooth, else 0: colours or matrices.
 
-    `smooth` is 1 where this surface and all before it are smooth, else 0.
+    It reflects light from above and from below, or lets it pass to and fro, each time through the slab it comes from.
     """
 
-    smooth: Value
-    passed: Value
-    reflected: Value
-    reflected_below: Value
-    above: Value
-    below: Value
+    reflected: Value | Mueller
+    reflected_below: Value | Mueller
+    passed: Value | Mueller
 
 
 def way_out(
@@ -105,41 +104,51 @@ def way_out(
 
     Args:
         turns: whether the way goes on by a reflection at the last surface; only for paths that come from above.
-        light: that along -wo, where facets polarise it. Reflections between smooth surfaces do not.
+        light: that along -wo, where surfaces polarise it.
     """
     lights = [light]
     w, density, others, reverse = [wo], [1.0], [0.0], [1.0]
-    spread, smooth = [1.0], 1.0
+    straight, smooth = [1.0], 1.0
     crossings: list[_Crossing] = []
     for k, surface in enumerate(layers.surfaces):
         indices = layers.index[k], layers.index[k + 1]
         meeting = SurfaceMeeting(layers, k, *indices, w[k], True, lights[k])
-        # Reflect between smooth surfaces
+        # Sum up what smooth surfaces do, while all are smooth
         smooth = ops.select(surface.smooth, smooth, 0.0)
-        mirrored = smooth * meeting.shares(w[k][2])[0]
+        acts = layers.shares if light is None else layers.mueller
         above = transmittance(layers.slabs[k], w[k][2])
+        mirrored, passing = acts(k, w[k][2], *indices, True)
         if k == layers.count - 1 and not layers.transmits:
-            crossings.append(_Crossing(smooth, 0.0, mirrored, 0.0, above, 0.0))
+            crossings.append(_Crossing(mirrored * (smooth * above), mirrored * 0.0, mirrored * 0.0))
             break
         # Refract into the next slab
         inward, rng = _refracted(types, meeting, rng)
         w.append((-inward.wo[0], -inward.wo[1], ops.maximum(-inward.wo[2], _GRAZING)))
         lights.append(inward.light)
-        spread.append(spread[k] * w[k][2] / (meeting.eta * meeting.eta * w[k + 1][2]))
+        spread = w[k][2] / (meeting.eta * meeting.eta * w[k + 1][2])
+        straight.append(straight[k] * inward.weight * above * spread)
         below = transmittance(layers.slabs[k + 1], w[k + 1][2])
-        mirrored_below = mirrored
-        if any(layers.films):
-            mirrored_below = smooth * layers.shares(k, w[k + 1][2], *indices[::-1], False)[0]
-        crossings.append(_Crossing(smooth, inward.weight, mirrored, mirrored_below, above, below))
+        mirrored_below = acts(k, w[k + 1][2], *indices[::-1], False)[0] if any(layers.films) else mirrored
+        passing = passing * passing * (smooth * above * below)
+        crossings.append(_Crossing(mirrored * (smooth * above), mirrored_below * (smooth * below), passing))
         # Sum up the strategies that the path may take instead
         density.append(inward.density)
         rough = ops.select(surface.smooth, 0.0, 1.0)
         more = ops.divide(inward.density_back, density[k]) * others[k] if k else 0.0
         others.append(ops.minimum(rough + more, events.HUGE))
         reverse.append(reverse[k] * ops.divide(inward.reverse, inward.density))
-    up, down = ([x * s for x, s in zip(weights, spread)] for weights in _sum_reflections(crossings))
-    each = map(tuple, (w, up, down, density, others, reverse))
-    out = replace(WayOut(*each), light=tuple(lights))
+    # Add reflections between smooth surfaces
+    sums = _sum_reflections(crossings)
+    up, down = straight, straight
+    light_up: tuple[Transport, ...] = ()
+    light_down: tuple[Transport, ...] = ()
+    if light is None:
+        up, down = ([x * y for x, y in zip(straight, each)] for each in sums)
+    else:
+        transports = [each for each in lights if isinstance(each, Transport)]
+        light_up, light_down = (tuple(x.after(y) for x, y in zip(transports, each)) for each in sums)
+    ways = tuple(w), tuple(up), tuple(down), tuple(density), tuple(others), tuple(reverse)
+    out = WayOut(*ways, light=light_up, light_down=light_down)
     if turns is False or layers.count == 1 or layers.hazy:
         return out, rng
     back, rng = _way_back(types, layers, out, smooth, rng)
@@ -155,7 +164,8 @@ def _way_back(
     """
     # Reflect at the last surface
     k = layers.count - 1
-    meeting = SurfaceMeeting(layers, k, layers.index[k], layers.index[k + 1], out.w[k], True, out.light[k])
+    light: Light | None = out.light[k] if out.light else None
+    meeting = SurfaceMeeting(layers, k, layers.index[k], layers.index[k + 1], out.w[k], True, light)
     if layers.microsurface:
         turned, rng = facets.sample_reflection(types, meeting, rng)
     else:
@@ -199,26 +209,26 @@ def _after(meeting: SurfaceMeeting, event: ScatteringEvent, way: WayBack) -> Way
     )
 
 
-def _sum_reflections(crossings: list[_Crossing]) -> tuple[list[Value], list[Value]]:
-    """The weights `up` and `down` of all slabs, solved like adding (up = a + b down in every slab)."""
+def _sum_reflections(crossings: list[_Crossing]) -> tuple[list[Any], list[Any]]:
+    """The light that starts at the top of each slab, up, and at its bottom, down, over what goes straight up from the
+    top: colours or matrices, solved like adding (up = a + b down in every slab)."""
     # Go down
-    a: list[Value] = [1.0]
-    b: list[Value] = [0.0]
+    none = crossings[0].reflected * 0.0
+    a, b, rounds = [_repeated(none)], [none], []
     for k, x in enumerate(crossings):
-        inside = x.passed * x.above / _left(x, b[k])
-        a.append(inside * a[k])
-        b.append(x.reflected_below * x.below + inside * b[k] * x.smooth * x.passed * x.below)
+        rounds.append(_repeated(x.reflected * b[k]))
+        a.append(a[k] * rounds[k])
+        b.append(x.reflected_below + rounds[k] * b[k] * x.passed)
     # Come back up
-    down: list[Value] = [0.0]
+    down = [none]
     for k, x in reversed(list(enumerate(crossings))):
-        returned = x.reflected * x.above * a[k] + x.smooth * x.passed * x.below * down[0]
-        down.insert(0, returned / _left(x, b[k]))
+        down.insert(0, rounds[k] * (x.reflected * a[k] + x.passed * down[0]))
     return [a[k] + b[k] * d for k, d in enumerate(down)], down
 
 
-def _left(x: _Crossing, b: Value) -> Value:
-    """Share of light that a round trip above a surface does not return."""
-    return ops.maximum(1 - x.reflected * x.above * b, _GRAZING)
+def _repeated(trip: Any) -> Any:
+    """Light after any number of round trips."""
+    return trip.repeated() if isinstance(trip, Mueller) else 1 / ops.maximum(1 - trip, _GRAZING)
 
 
 def way_up(out: WayOut, j: Value, down: Value) -> Direction:
@@ -266,18 +276,20 @@ def connect_back(meeting: SurfaceMeeting, event: ScatteringEvent, out: WayOut, p
     return ops.select(out.turns & (layers.is_base(j) ^ True), value, 0.0)
 
 
-def connect_medium_back(layers: WalkedLayers, out: WayOut, path: Path) -> Value:
-    """Contribution of a path that scatters in a medium along the way back, per unit of its weight."""
+def connect_medium_back(layers: WalkedLayers, out: WayOut, path: Path) -> tuple[Value, Light | None]:
+    """Contribution of a path that scatters in a medium along the way back, per unit of its weight; and the light that
+    the way brings there."""
     slab, way = layers.slab(path.slab), _way_back_below(out, path.slab - 1)
     assert slab.phase
     density = slab.phase.density(-ggx.dot(path.w, way.w))
     more = ops.divide(density, way.density) * way.others
     passed = way.carried * transmittance(slab, way.w[2], 1 - path.height)
-    return ops.select(out.turns, density * passed * _share(path, way.reverse, density, False, more), 0.0)
+    return ops.select(out.turns, density * passed * _share(path, way.reverse, density, False, more), 0.0), way.light
 
 
-def connect_medium(layers: WalkedLayers, out: WayOut, path: Path) -> Value:
-    """Contribution of a path that scatters in a medium along the way, per unit of its weight."""
+def connect_medium(layers: WalkedLayers, out: WayOut, path: Path) -> tuple[Value, Light | None]:
+    """Contribution of a path that scatters in a medium along the way, up or down, per unit of its weight; and the light
+    that the way brings there."""
     k, slab = path.slab, layers.slab(path.slab)
     assert slab.phase
     w = _direction(out, k)
@@ -286,7 +298,13 @@ def connect_medium(layers: WalkedLayers, out: WayOut, path: Path) -> Value:
     upwards = density * pick(out.up, k) * transmittance(slab, w[2], path.height)
     upwards *= _share(path, pick(out.reverse, k), density, False, more)
     density = slab.phase.density(ggx.dot(path.w, (w[0], w[1], -w[2])))
-    return upwards + density * pick(out.down, k) * transmittance(slab, w[2], 1 - path.height)
+    downwards = density * pick(out.down, k) * transmittance(slab, w[2], 1 - path.height)
+    value = upwards + downwards
+    if not out.light:
+        return value, None
+    each = (out.light, upwards), (out.light_down, downwards)
+    above, below = (pick(light, k).times(ops.divide(share, value)) for light, share in each)
+    return value, above.plus(below)
 
 
 def _share(path: Path, of_way: Value, reverse: Value, drawn: Value, others: Value) -> Value:

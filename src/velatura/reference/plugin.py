@@ -12,7 +12,7 @@ import numpy as np
 from velatura import kernel, metals, ops
 from velatura.binding import Asked, Binding, plugin_class
 from velatura.errors import InvalidInput
-from velatura.optics.polarisation import all_light, horizontal
+from velatura.optics.polarisation import Transport, all_light, horizontal
 from velatura.reference import proxy
 from velatura.reference.layers import ALPHA_MIN, WalkedLayers, from_material, relative_index, zeros
 from velatura.reference.metal import WAVELENGTHS
@@ -55,6 +55,9 @@ def make(mi: Any) -> type:
         both axes is perfectly smooth. Not differentiable. In RGB variants, an estimate for a stack that ends in a metal
         by name or by tables may have a negative channel, since light that has met it often lies outside sRGB.
 
+        In polarised variants samples and values are Mueller matrices: interfaces polarise what they reflect and
+        refract, media and diffuse bases depolarise what they scatter. Paths are drawn as for unpolarised light.
+
         Components are light that met only smooth interfaces (delta), light that the diffuse base scattered (diffuse),
         and all other light (glossy), by side. Those of a mixture follow each other; a path walks in one of its stacks.
         """
@@ -74,15 +77,13 @@ def make(mi: Any) -> type:
 
 @dataclass(frozen=True)
 class Settings:
-    """How paths walk: properties of the plugin, the least roughness of interfaces, from either end or from one, and
-    whether facets polarise light in polarised variants, which needs interfaces that are rough."""
+    """How paths walk: properties of the plugin, the least roughness of interfaces, and from either end or from one."""
 
     seed: int
     max_depth: int
     microsurface: bool
     least_alpha: float = 0.0
     either_end: bool = False
-    polarised: bool = False
 
     @property
     def facts(self) -> dict[str, str]:
@@ -199,8 +200,8 @@ class WalkedPoint:
         rng = stack.stream(sample1, sample2.x, sample2.y, wi.x, wi.y, si.p.x, si.p.y, si.p.z)
         seen = (wi.x, wi.y, dr.abs(wi.z))
         one = layers.start(mi.UnpolarizedSpectrum(1))
-        path = walk(mi, layers, seen, rng, one, active, stack.settings.max_depth)
-        weight = layers.seen(path.weight, mi.UnpolarizedSpectrum)
+        light = self._all_light(layers, seen, one)
+        path = walk(mi, layers, seen, rng, one, active, stack.settings.max_depth, light=light)
         # Describe how it ended
         reflected = path.w[2] > 0
         bs = mi.BSDFSample3f()
@@ -209,9 +210,11 @@ class WalkedPoint:
         bs.pdf = dr.select(path.smooth, 1.0, proxy.density(layers, seen, path.w))
         bs.sampled_component, bs.sampled_type, asked = self._drawn(reflected, path)
         passed = active & (path.alive ^ True) & asked
-        if self.radiance:
-            weight /= bs.eta * bs.eta
-        return bs, mi.depolarizer(dr.select(passed, weight, 0))
+        squeezed = bs.eta * bs.eta if self.radiance else 1.0
+        parts = path.light.rows(path.w) if isinstance(path.light, Transport) else [1.0]
+        weights = [layers.seen(path.weight * part, mi.UnpolarizedSpectrum) for part in parts]
+        values = [dr.select(passed, weight / squeezed, 0) for weight in weights]
+        return bs, self._matrix(values, bs.wo, mi.Bool(False), flipped)
 
     def eval(self, wo: Any, active: Any) -> Any:
         import drjit as dr
@@ -230,18 +233,21 @@ class WalkedPoint:
         turns = seen[2] > 0 if either else False
         one = layers.start(mi.UnpolarizedSpectrum(1))
         leaving = end.x, end.y, dr.abs(end.z)
-        polarised = stack.settings.polarised and mi.is_polarized and layers.polarises
-        light = all_light((-leaving[0], -leaving[1], -leaving[2]), one) if polarised else None
-        out, rng = way_out(mi, layers, leaving, rng, turns, light)
-        depth = stack.settings.max_depth
-        path = walk(mi, layers, seen, rng, one, active, depth, out, self._painted, polarised, either)
+        out, rng = way_out(mi, layers, leaving, rng, turns, self._all_light(layers, leaving, one))
+        depth, light = stack.settings.max_depth, self._all_light(layers, seen, one)
+        path = walk(mi, layers, seen, rng, one, active, depth, out, self._painted, light, either)
         # Turn it around, and energy into radiance
         factor = dr.select(turned, dr.abs(wo.z) / dr.maximum(dr.abs(wi.z), 1e-7), 1.0)
         if stack.transmits:
             scale = dr.select(seen[2] > 0, 1.0, relative_index(layers.index[0], layers.index[-1]))
             factor *= dr.select(turned ^ mi.Bool(self.radiance), scale * scale, 1.0)
         values = [dr.select(active, factor * layers.seen(x, mi.UnpolarizedSpectrum), 0) for x in path.value]
-        return self._matrix(values, wo, turned, flipped) if polarised else mi.depolarizer(values[0])
+        return self._matrix(values, wo, turned, flipped)
+
+    def _all_light(self, layers: WalkedLayers, w: Any, one: Any) -> Transport | None:
+        """Light along -w, as a path begins; None in variants without polarisation, and where a film has no matrix."""
+        polarised = self.stack.mi.is_polarized and layers.polarises
+        return all_light((-w[0], -w[1], -w[2]), one) if polarised else None
 
     def smooth(self, wo: Any) -> Any:
         """Mueller matrix of a stack of smooth interfaces, for its mirrored direction or the refracted one."""
@@ -260,13 +266,16 @@ class WalkedPoint:
         return self._matrix(rows, wo, mi.Bool(False), flipped)
 
     def _matrix(self, parts: list[Any], wo: Any, turned: Any, flipped: Any) -> Any:
-        """Mueller matrix in the frames of the renderer, by its `parts` row by row, of light that walks in.
+        """Mueller matrix in the frames of the renderer, by its `parts` row by row, of light that walks in; one part is
+        that of depolarised light.
 
         Where the walk is `turned`, it came from `wo`; where it is `flipped`, its coordinates are upside down.
         """
         import drjit as dr
 
         mi = self.stack.mi
+        if len(parts) == 1:
+            return mi.depolarizer(parts[0])
         # Light walks in from the side from which the renderer has it come, or the other way
         other_way = turned ^ mi.Bool(self.radiance)
         mirrored, back = (1.0, 1.0, -1.0, -1.0), (1.0, 1.0, -1.0, 1.0)

@@ -16,7 +16,7 @@ from velatura.ops import Value
 from velatura.optics import ggx
 from velatura.optics.ggx import Direction
 from velatura.optics.phase import deflect
-from velatura.optics.polarisation import Light, Transport, all_light, unpolarised
+from velatura.optics.polarisation import Light, Transport
 from velatura.reference import events, facets
 from velatura.reference.events import ScatteringEvent, SurfaceMeeting
 from velatura.reference.layers import WalkedLayers, pick
@@ -76,7 +76,7 @@ def walk(
     max_depth: int = 1000,
     out: WayOut | None = None,
     painted: bool | None = None,
-    polarised: bool = False,
+    light: Light | None = None,
     either_end: bool = False,
 ) -> Path:
     """Follow paths that enter along -wi until they leave, die, or have met `max_depth` events.
@@ -88,9 +88,9 @@ def walk(
         colour: what a path carries at first, all channels 1.
         out: the way out that every event is connected to; the paths then gather the BSDF's `value` for it.
         painted: gathered is from paths that the diffuse base has scattered, from all others (False), or both (None).
-        polarised: whether facets polarise the light, which is unpolarised at first; with an `out` that is polarised,
-            the value is a Mueller matrix, for frames whose x is `horizontal` at both ends. Media depolarise what they
-            scatter, since their phase function has no Mueller matrix, and so does a diffuse base.
+        light: that along -wi, where surfaces polarise it; with an `out` that is polarised, the value is a Mueller
+            matrix, for frames whose x is `horizontal` at both ends. Media depolarise what they scatter, since their
+            phase function has no Mueller matrix, and so does a diffuse base.
         either_end: whether half of all paths, by chance, are to be followed from the other end: with `wi` and `out`
             exchanged. The value is then the mean over both.
 
@@ -101,9 +101,6 @@ def walk(
 
     # Enter
     below, w = wi[2] < 0, (-wi[0], -wi[1], -wi[2])
-    light: Light | None = None
-    if polarised:
-        light = unpolarised(w, colour) if out is None else all_light(w, colour)
     path = Path(
         rng=rng,
         w=w,
@@ -118,7 +115,7 @@ def walk(
         alive=types.Bool(active),
         density=types.Float(1),
         chain=types.Float(0),
-        value=[colour * 0 for _ in range(16 if polarised and out is not None else 1)],
+        value=[colour * 0 for _ in range(16 if light and out else 1)],
         light=light,
         backward=types.Float(0) if either_end else None,
         straight=types.Float(1) if either_end else None,
@@ -225,15 +222,16 @@ def _gather(
     slab = ops.select(path.inside, path.slab, meeting.j + back)
     for n, event in enumerate(towards):
         gathered, light = at_surface(meeting, event, out, path, down), event.light and event.light.mirrored(down ^ True)
+        w, way = out.along(slab, back)
         if layers.scatters:
-            gathered = ops.select(path.inside, in_medium(layers, out, path) if n == 0 else 0.0, gathered)
+            scattered, there = in_medium(layers, out, path)
+            gathered = ops.select(path.inside, scattered if n == 0 else 0.0, gathered)
+            light = ops.select_record(path.inside, path.light and path.light.depolarised(w), light)
+            way = ops.select_record(path.inside, there, way)
         gathered = path.weight * ops.select(kept, gathered, 0.0)
         if path.light is None:
             path.value[0] += gathered
             continue
-        w, way = out.along(slab, back)
-        if layers.scatters:
-            light = ops.select_record(path.inside, path.light.depolarised(w), light)
         assert isinstance(light, Transport) and isinstance(way, Transport)
         for k, part in enumerate(light.joined(w, way)):
             path.value[k] += gathered * part
