@@ -146,7 +146,6 @@ def test_a_material_is_prepared_by_the_same_kernels_when_its_values_change(monke
     import drjit as dr
 
     monkeypatch.setattr(compiled, "MANY", -1)
-    monkeypatch.setattr(compiled, "MANY_DEPOSITED", -1)
 
     def kernels(alpha: float) -> list[Any]:
         KEPT.clear()

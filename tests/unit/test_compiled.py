@@ -21,7 +21,7 @@ from velatura.model.solved import reciprocal_balance
 from velatura.model.solved.solve import solve
 from velatura.model.variance import variance_kind
 from velatura.renderer import compiled
-from velatura.renderer.compiled import Colour, Deposit, Found
+from velatura.renderer.compiled import Alike, Colour, Deposit, Found
 from velatura.renderer.directional_grid import Curves
 from velatura.renderer.kept import Kept
 from velatura.stack import Interface, Material, Stack
@@ -51,7 +51,6 @@ def numbers(where: object = None) -> Any:
 
 def by_kernels(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(compiled, "MANY", -1)
-    monkeypatch.setattr(compiled, "MANY_DEPOSITED", -1)
     monkeypatch.setattr(compiled, "LEAST", 0)
 
 
@@ -140,6 +139,36 @@ def test_light_falls_on_its_rows() -> None:
     assert light[2, 1] == pytest.approx(wanted, abs=1e-14)
 
 
+@pytest.mark.parametrize("kernels", [False, True])
+def test_lights_that_are_alike_fall_as_if_each_were_by_itself(kernels: bool, monkeypatch: pytest.MonkeyPatch) -> None:
+    def deposit(light: Any) -> Deposit:
+        place, x = light
+        return Deposit(ops.floor(place * (ROWS - 3)) - 1, [x, 0.5 * x, x * x, 1.0], [x, place], [1.0, x, place])
+
+    def grouped(sources: Any, samples: Any, numbers: Any) -> Found:
+        (p,), (u,) = sources, samples
+        return Found([p], [], [deposit([u, p]), Alike([[p * u, u], [u, 0.5], [p * u * u, p + u]], deposit)])
+
+    def each(sources: Any, samples: Any, numbers: Any) -> Found:
+        (p,), (u,) = sources, samples
+        return Found([p], [], [*map(deposit, ([u, p], [p * u, u], [u, 0.5], [p * u * u, p + u]))])
+
+    truth = compiled.over(each, SOURCES, SAMPLES, [], ROWS)
+    if kernels:
+        by_kernels(monkeypatch)
+    _, _, lights = compiled.over(grouped, SOURCES, SAMPLES, [], ROWS)
+    assert len(lights) == 4
+    for light, wanted in zip(lights, truth[2]):
+        assert light == pytest.approx(wanted, abs=1e-13)
+
+
+def test_kernels_that_read_many_numbers_are_never_compiled(monkeypatch: pytest.MonkeyPatch) -> None:
+    by_kernels(monkeypatch)
+    monkeypatch.setattr(compiled, "LONG", 2)
+    monkeypatch.setattr(compiled, "_compiled", lambda *_: pytest.fail("a kernel is launched"))
+    assert compiled.over(function, SOURCES, SAMPLES, numbers(), ROWS)[0].shape == (4, 7)
+
+
 def test_objects_that_no_kernel_reads_run_by_numpy(monkeypatch: pytest.MonkeyPatch) -> None:
     def refused(*_: object) -> None:
         raise AssertionError
@@ -162,7 +191,7 @@ def test_kernels_that_are_kept_on_disk_are_used_at_once(monkeypatch: pytest.Monk
 
     monkeypatch.setattr(compiled, "_compiled", noted)
     for many in (1 << 60, -1, 1 << 60):
-        monkeypatch.setattr(compiled, "MANY_DEPOSITED", many)
+        monkeypatch.setattr(compiled, "MANY", many)
         for memory in (compiled._mark.cache_clear, compiled._kernels.clear, compiled._asked.clear):
             memory()
         compiled.over(function, SOURCES, SAMPLES, numbers(), ROWS)
@@ -189,7 +218,7 @@ def test_kernels_are_used_at_once_where_results_must_not_depend_on_the_past(
         memory()
     with kernel.compiled_first():
         found = [compiled.over(function, SOURCES, SAMPLES, numbers(), ROWS) for _ in range(3)]
-    assert plain == [1]  # which shows what a kernel of the kind returns
+    assert plain == []
     assert len({(sums.tobytes(), largest.tobytes(), light.tobytes()) for sums, largest, (light,) in found}) == 1
 
 

@@ -32,9 +32,9 @@ from velatura.version import __version__
 
 Array = NDArray[Any]
 
-MANY = 100_000  # values of a kind, a fifth as long as a kernel of it takes to compile where none is kept on disk
-MANY_DEPOSITED = 200_000  # likewise of kinds with light that falls on rows, whose kernels are longer
-FEW_LIGHTS = 4  # of these, beyond which values take as long again
+MANY = 500_000  # values of a kind, about as long as a kernel of it takes to compile where none is kept on disk
+FEW_LIGHTS = 8  # that fall on rows, beyond which values take as long again
+LONG = 256  # numbers that a kernel reads, beyond which it is never compiled: that would take seconds
 LEAST = 2_000  # values at a time: for fewer, a kernel takes longer to launch than NumPy to run
 SHARED = 2_000_000  # values at a time, from which several threads run a kernel; see `_lanes`
 BLOCK = 1 << 15  # values at a time, which a processor's cache holds
@@ -60,13 +60,21 @@ class Deposit(NamedTuple):
     waves: Sequence[Value]
 
 
+class Alike(NamedTuple):
+    """Lights that fall on rows in the same way: the values of each, as many for all, and the deposit that these make.
+    A kernel holds that function once, in a loop: most of the time to compile it goes into deposits."""
+
+    lights: Sequence[Sequence[Value]]
+    deposit: Callable[[Sequence[Value]], Deposit]
+
+
 class Found(NamedTuple):
     """Results of a function for sources and samples: values that are summed up over the samples, values of which the
     largest is wanted, and light that falls on rows."""
 
     sums: Sequence[Value] = ()
     largest: Sequence[Value] = ()
-    deposits: Sequence[Deposit] = ()
+    deposits: Sequence[Deposit | Alike] = ()
 
 
 @dataclass(frozen=True)
@@ -110,7 +118,9 @@ def over(
         with contextlib.suppress(_Foreign):
             read = _Read([], [])
             asked = function.__module__, function.__qualname__, kind, *(x.ndim for x in samples), _kind(numbers, read)
-            many = _asked[asked] > (MANY_DEPOSITED if rows else MANY)
+            if len(sources) + len(read.flat) > LONG:
+                raise _Foreign
+            many = _asked[asked] > MANY
             kernels = kernel.llvm() if many or kernel.compiles_first() or _mark(asked).exists() else None
             if kernels:
                 # A launch looks at its arguments by Python while it holds Dr.Jit's own lock, and a thread that asks
@@ -145,7 +155,15 @@ def _plain(
 
     sums = _rows([value.sum(axis=1) for value in each(found.sums)], shape[0])
     largest = _rows([value.max(axis=1) for value in each(found.largest)], shape[0])
-    return sums, largest, [_deposited(each, shape, rows) for each in found.deposits]
+    return sums, largest, [_deposited(light, shape, rows) for group in found.deposits for light in _deposits(group)]
+
+
+def _deposits(group: Deposit | Alike) -> Iterator[Deposit]:
+    """The deposit of each light."""
+    if isinstance(group, Deposit):
+        yield group
+    else:
+        yield from map(group.deposit, group.lights)
 
 
 def _rows(each: Sequence[Array], width: int) -> Array:
@@ -157,18 +175,23 @@ def _deposited(light: Deposit, shape: tuple[int, int], rows: int) -> Array:
     """Light that falls on rows, samples being columns of a sparse matrix."""
     from scipy.sparse import csc_array  # slow to load
 
-    shares, values, waves = (
-        np.stack(np.broadcast_arrays(*each, np.empty(shape))[:-1], axis=-1)
-        for each in (light.shares, _channels(light.values), light.waves)
-    )
+    values, waves = _channels(light.values), light.waves
+    shares, each = _columns(light.shares, shape), _columns([x * wave for x in values for wave in waves], shape)
     first, source = np.asarray(light.first).astype(np.int32), np.arange(shape[0], dtype=np.int32)[:, None]
     steps = np.int32(shape[0]) * np.arange(shares.shape[-1], dtype=np.int32)
     places = (first * np.int32(shape[0]) + source)[..., None] + steps
     places[..., 0] += np.where(first < 0, np.int32((rows + 1) * shape[0]), 0)
     entries = shares.ravel(), places.ravel(), np.arange(0, shares.size + 1, shares.shape[-1], dtype=np.int32)
-    each = (values[..., :, None] * waves[..., None, :]).reshape(shape[0] * shape[1], values.shape[-1] * waves.shape[-1])
-    found = csc_array(entries, ((rows + 1) * shape[0], len(each))) @ each
-    return found.T.reshape(values.shape[-1], waves.shape[-1], rows + 1, shape[0])
+    found = csc_array(entries, ((rows + 1) * shape[0], shape[0] * shape[1])) @ each.reshape(-1, each.shape[-1])
+    return found.T.reshape(len(values), len(waves), rows + 1, shape[0])
+
+
+def _columns(each: Sequence[Value], shape: tuple[int, int]) -> Array:
+    """Values side by side, (S, N, values)."""
+    found = np.empty((*shape, len(each)))
+    for k, value in enumerate(each):
+        found[..., k] = value
+    return found
 
 
 class _Read(NamedTuple):
@@ -180,12 +203,12 @@ class _Read(NamedTuple):
 
 @dataclass(frozen=True)
 class _Kernel:
-    """A frozen function of Dr.Jit, how many sums and largest values it has, and of each light how many values, times
-    waves, it deposits."""
+    """A frozen function of Dr.Jit, how many sums and largest values it has, and of each group of lights that are alike
+    how many there are, and how many values, times waves, each deposits."""
 
     launch: Any
     counts: tuple[int, int]
-    lights: list[tuple[int, int]]
+    groups: list[tuple[int, int, int]]
 
 
 def _compiled(
@@ -224,17 +247,18 @@ def _compiled(
     of_kind = _kernels[kind]
     found = dr.opaque(module.Float64, 0.0, max(sum(of_kind.counts), 1) * width)
     outs = [
-        [dr.opaque(module.Float64, 0.0, (rows + 1) * width * part) for _, part in _packets(values * waves)]
-        for values, waves in of_kind.lights
+        [dr.opaque(module.Float64, 0.0, alike * (rows + 1) * width * part) for _, part in _packets(values * waves)]
+        for alike, values, waves in of_kind.groups
     ]
     with _uncollected():
         found, outs = of_kind.launch(_numbered(module.UInt32, lanes), *given, found, outs)
     # Copies, since an array of NumPy's that has Dr.Jit's memory asks it for its lock wherever it is released
     totals, greatest, _ = np.split(np.array(found.numpy()).reshape(-1, width), np.cumsum(of_kind.counts))
     lights = []
-    for (values, waves), parts in zip(of_kind.lights, outs):
-        light = np.concatenate([x.numpy().reshape(rows + 1, width, -1) for x in parts], axis=-1)
-        lights.append(np.moveaxis(light[..., : values * waves], -1, 0).reshape(values, waves, rows + 1, width))
+    for (alike, values, waves), parts in zip(of_kind.groups, outs):
+        each = np.concatenate([x.numpy().reshape(alike, rows + 1, width, -1) for x in parts], axis=-1)
+        each = np.moveaxis(each[..., : values * waves], -1, 1)
+        lights += [*each.reshape(alike, values, waves, rows + 1, width)]
     return totals, greatest, lights
 
 
@@ -268,8 +292,12 @@ def _kernel(
 
     number, integer = module.Float64, module.UInt32
     own = [x.ndim > 1 for x in samples]
-    once = _plain(function, [x[:1] for x in sources], [x[..., :1][:1] for x in samples], numbers, rows)
-    counts = len(once[0]), len(once[1])
+    one = function([x[:1, None] for x in sources], [x[..., :1][:1] for x in samples], numbers)
+    counts = len(_channels(one.sums)), len(_channels(one.largest))
+    groups = []
+    for group in one.deposits:
+        first, *others = _deposits(group)
+        groups.append((1 + len(others), len(_channels(first.values)), len(first.waves)))
 
     def launch(
         lane: Any,
@@ -295,8 +323,8 @@ def _kernel(
             def add(k: Any, sums: list[Any], largest: list[Any]) -> tuple[Any, list[Any], list[Any]]:
                 each = [dr.gather(number, x, k * width + source if of_own else k) for x, of_own in zip(of_samples, own)]
                 more = function(at_source, each, read)
-                for light, parts in zip(more.deposits, outs):
-                    deposit(light, parts, source)
+                for group, parts in zip(more.deposits, outs):
+                    deposit(group, parts, source)
                 sums = [total + value for total, value in zip(sums, _channels(more.sums))]
                 largest = [dr.maximum(most, value) for most, value in zip(largest, _channels(more.largest))]
                 return k + 1, sums, largest
@@ -307,7 +335,25 @@ def _kernel(
                 dr.scatter(out, value, j * width + source, mode=dr.ReduceMode.NoConflicts)
             return (source + lanes,)
 
-        def deposit(light: Deposit, parts: Sequence[Any], source: Any) -> None:
+        def deposit(group: Deposit | Alike, parts: Sequence[Any], source: Any) -> None:
+            if isinstance(group, Deposit):
+                return fall(group, parts, source)
+            lights, place = group
+            columns = [*zip(*lights)]
+
+            def one(k: Any) -> tuple[Any]:
+                fall(place([chosen(k, column) for column in columns]), parts, k * ((last + 1) * width) + source)
+                return (k + 1,)
+
+            dr.while_loop((integer(0),), lambda k: k < len(lights), one, mode="symbolic")
+
+        def chosen(k: Any, column: Sequence[Any]) -> Any:
+            found = number(column[0])
+            for j, value in enumerate(column[1:], start=1):
+                found = dr.select(k == j, value, found)
+            return found
+
+        def fall(light: Deposit, parts: Sequence[Any], source: Any) -> None:
             values = [value * wave for value in _channels(light.values) for wave in light.waves]
             first = module.Int64(light.first)
             for j, share in enumerate(light.shares):
@@ -322,7 +368,7 @@ def _kernel(
         return out, outs
 
     frozen = dr.freeze(launch, limit=SIZES, warn_after=1 << 30)
-    return _Kernel(frozen, counts, [light.shape[:2] for light in once[2]])
+    return _Kernel(frozen, counts, groups)
 
 
 @contextlib.contextmanager

@@ -12,20 +12,21 @@ from abc import ABC, abstractmethod
 from collections.abc import Hashable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from itertools import groupby
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from velatura import ops
-from velatura.model.rough_interface import Light, Scatter
+from velatura.model.rough_interface import Scatter
 from velatura.model.solved.energies.matrices import Blocks
 from velatura.model.solved.energies.nodes import Nodes
 from velatura.model.solved.energies.operators import Operator
 from velatura.model.solved.guards import MOMENTUM_MIN
 from velatura.ops import Value
 from velatura.renderer import compiled
-from velatura.renderer.compiled import Deposit, Found, Number
+from velatura.renderer.compiled import Alike, Deposit, Found, Number
 
 Array = NDArray[np.floating]
 
@@ -90,12 +91,15 @@ class Basis(ABC):
         def function(sources: Sequence[Value], lattice: Sequence[Value], values: Any) -> Found:
             known, own = values
             lights, others = scatter(sources, lattice, own)
-            deposits = []
-            for light in lights:
-                length, cosine, sine = _polar(light)
+
+            def deposit(light: Sequence[Value]) -> Deposit:
+                x, y, *weights = light
+                length, cosine, sine = _polar(x, y)
                 first, shares = self.nodes.stencil(length, known)
-                deposits.append(Deposit(first, shares, light.weights, self.angular(cosine, sine)))
-            return Found(others, (), deposits)
+                return Deposit(first, shares, weights, self.angular(cosine, sine))
+
+            each = ([light.x, light.y, *light.weights] for light in lights)
+            return Found(others, (), [Alike([*group], deposit) for _, group in groupby(each, len)])
 
         kind = kind, self.kind, len(self.nodes.cells)
         others, _, lights = compiled.over(
@@ -379,8 +383,8 @@ class Even(Basis):
         return self._fading[:, None] * found
 
 
-def _polar(light: Light) -> tuple[Value, Value, Value]:
+def _polar(x: Value, y: Value) -> tuple[Value, Value, Value]:
     """Lengths of momenta, and cosine and sine of their azimuths."""
-    length = ops.sqrt(light.x * light.x + light.y * light.y)
+    length = ops.sqrt(x * x + y * y)
     scale = 1 / ops.maximum(length, MOMENTUM_MIN)
-    return length, light.x * scale, light.y * scale
+    return length, x * scale, y * scale

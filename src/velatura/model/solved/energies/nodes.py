@@ -98,12 +98,10 @@ class Nodes:
     @cached_property
     def numbers(self) -> list[float]:
         """Numbers for `stencil`: the inner ends, and of each part the square of its beginning, the inverse of its
-        length in squares, its cells for each radian, its last cell, the first and the last one that a stencil begins
-        at, and the number of its first node."""
+        length in squares, its cells, and the number of its first node."""
         squares, cells = np.square(self.ends), np.array(self.cells, float)
-        lowest = np.r_[-1, np.zeros(len(cells) - 1)]
         before = np.r_[0, np.cumsum(cells)[:-1]]
-        parts = squares[:-1], 1 / np.diff(squares), 2 / np.pi * cells, cells - 1, lowest, cells - STENCIL + 1, before
+        parts = squares[:-1], 1 / np.diff(squares), cells, before
         return [*self.ends[1:-1], *np.concatenate(parts).tolist()]
 
     def stencil(self, p: Value, numbers: Sequence[Value]) -> tuple[Value, list[Value]]:
@@ -121,13 +119,16 @@ class Nodes:
                 found = ops.select(there, value, found)
             return found
 
-        share = ops.clip((p * p - of_part(0)) * of_part(1), 0.0, 1.0)
-        u = ops.arctan2(ops.sqrt(share), ops.sqrt(1 - share)) * of_part(2)
-        start = ops.clip(ops.floor(ops.minimum(u, of_part(3))) - 1, of_part(4), of_part(5))
+        begin2, inverse, cells, before = map(of_part, range(4))
+        share = ops.clip((p * p - begin2) * inverse, 0.0, 1.0)
+        u = ops.arctan2(ops.sqrt(share), ops.sqrt(1 - share)) * (cells * (2 / np.pi))
+        # The first part goes on beyond 0
+        lowest = ops.select(beyond[0], 0.0, -1.0) if beyond else -1.0
+        start = ops.clip(ops.floor(ops.minimum(u, cells - 1)) - 1, lowest, cells - (STENCIL - 1))
         t = u - start
         t_1, t_2, t_3 = t - 1, t - 2, t - 3
         outer, inner = t_2 * t_3 / 6, t * t_1 / 2
-        return start + of_part(6), [-t_1 * outer, 3 * t * outer, -inner * t_3, inner * t_2 / 3]
+        return start + before, [-t_1 * outer, 3 * t * outer, -inner * t_3, inner * t_2 / 3]
 
     def weights(self, n: float) -> Array:
         """Integrals over p^2 in [0, n^2] of the functions that light is shared by, (N,); not to be written to."""
