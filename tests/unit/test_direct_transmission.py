@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from itertools import pairwise
+from typing import Any
 
 import numpy as np
 import pytest
@@ -14,6 +15,7 @@ from velatura import kernel
 from velatura.model.solved.transmission import direct
 from velatura.model.solved.transmission.direct import Transmission
 from velatura.model.variance import Covariance, Isotropic, variance_kind
+from velatura.renderer import compiled
 from velatura.stack import Material, number
 
 Array = NDArray[np.floating]
@@ -266,3 +268,34 @@ def test_one_interface_is_the_rough_dielectric_of_mitsuba(n_above: float, n_belo
     assert np.mean(lost) < 0.03
     np.testing.assert_allclose(density[passed], np.array(known_density)[passed], rtol=2e-3, atol=1e-5)
     np.testing.assert_allclose(density[~passed][~lost], np.array(known_density)[~passed][~lost], rtol=2e-3, atol=1e-5)
+
+
+def test_light_of_many_brushed_interfaces_is_round_and_has_fewer_rays(monkeypatch: pytest.MonkeyPatch) -> None:
+    """As many interfaces as have rays, and no kernel, which would take a second to compile, for one use."""
+    rng = np.random.default_rng(4)
+
+    def brushed(count: int) -> Transmission:
+        each = rng.uniform([1.2, 0.03, 0.1, 0.0], [1.9, 0.2, 0.5, 180.0], (count, 4)).tolist()
+        stack = vt.Stack([vt.Interface(eta=eta, alpha=(u, v), rotation=turn) for eta, u, v, turn in each], thin=True)
+        return transmissions(stack)[0]
+
+    asked: list[int] = []
+    original = compiled.over
+
+    def counted(function: Any, sources: Any, samples: Any, *others: Any) -> Any:
+        asked.append(samples[0].shape[-1])
+        return original(function, sources, samples, *others)
+
+    monkeypatch.setattr(compiled, "over", counted)
+    monkeypatch.setattr(compiled, "LEAST", 0)
+    monkeypatch.setattr(compiled, "MANY", -1)
+    monkeypatch.setattr(compiled, "_compiled", lambda *_: pytest.fail("a kernel is launched"))
+    z, phi = np.array([0.9, 0.6, 0.3]), np.array([0.2, 1.9, 4.0])
+    wi = np.sqrt(1 - z * z) * np.cos(phi), np.sqrt(1 - z * z) * np.sin(phi), z
+    for count in (8, 16):
+        passing = brushed(count)
+        energy, _, _ = direct.integrals(passing, wi)
+        fine, _, _ = direct.integrals(passing, wi, (48, 128))
+        assert energy == pytest.approx(fine, abs=2e-3)
+    along, around = direct.NODES
+    assert asked[::2] == [2 * along * 17, 2 * along * direct.LEAST_RAYS] and around > 17

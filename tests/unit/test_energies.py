@@ -11,6 +11,7 @@ from velatura import ops, tables
 from velatura.model.guards import ALPHA_MIN
 from velatura.model.rough_interface import KEPT, Facets, FirstEvents
 from velatura.model.solved.energies import adding
+from velatura.model.solved.energies import energies as of_energies
 from velatura.model.solved.energies.adding import Leaving, indices, layers, parts
 from velatura.model.solved.energies.energies import Energies, energies
 from velatura.model.solved.energies.interfaces import Setting
@@ -82,6 +83,25 @@ def test_many_media_share_nodes() -> None:
     many = [1.0, *np.linspace(1.05, 2.5, 30).tolist()]
     assert Nodes.of(many, 24).count < 1.7 * Nodes.of(many[:4], 24).count
     assert Nodes.of(many, 24).ends[-1] == 2.5
+
+
+@pytest.mark.parametrize(("count", "azimuths", "modes"), [(4, 6, 9), (5, 4, 5)])
+def test_more_than_four_brushed_interfaces_have_two_orders_of_the_azimuth(
+    count: int, azimuths: int, modes: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """What matrices and light from the nodes cost, by the numbers of both."""
+    settings: list[Setting] = []
+
+    def stopped(_: Any, setting: Setting) -> Any:
+        settings.append(setting)
+        raise InterruptedError
+
+    monkeypatch.setattr(of_energies, "layers", stopped)
+    stack = Stack([Interface(eta=1.3 + 0.1 * k, alpha=(0.02, 0.3), rotation=20.0 * k) for k in range(count)])
+    with pytest.raises(InterruptedError):
+        solved(stack)
+    basis = settings[0].basis
+    assert (len(basis.azimuths), basis.size) == (azimuths, modes * basis.nodes.count)
 
 
 # Smooth interfaces

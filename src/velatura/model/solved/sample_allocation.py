@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from velatura import ops
 
+MANY = 4  # interfaces or lobes, beyond which each has fewer samples
 TARGET_SAMPLE_WEIGHT = 2.7  # weight of samples of a part, where they can be kept so light
 KEPT = 0.7  # of the share by its energy that a part keeps at least
 STEPS = 8  # of halving
@@ -48,6 +49,11 @@ class Demand(NamedTuple):
         less = np.zeros_like(self.energy)
         less[k] = weight
         return Demand(self.energy, *(np.maximum(x - less, 0) for x in self[1:]))
+
+
+def share(parts: int) -> float:
+    """Share of the usual samples that each of some parts has: less where there are many, so that time stays bounded."""
+    return min(1.0, MANY / max(parts, 1))
 
 
 def shared(demand: Demand) -> Array:

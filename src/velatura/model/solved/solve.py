@@ -52,7 +52,6 @@ Array = NDArray[np.floating]
 
 RGB = 3
 NORMALS = {True: 1597, False: 987}  # over which lobes are integrated, of isotropic materials and of others
-MANY = 4  # interfaces or lobes, beyond which each has fewer samples
 FINELY = 1597, 4181  # facets, and as NORMALS, for differences, whose error is that of values over a step
 BETWEEN = {True: 144, False: 89}  # as NORMALS, for each place of a renderer's grid
 NARROW = 0.05  # roughness of lobes whose integrals have edges between directions, as those of interfaces do
@@ -297,7 +296,9 @@ class Solver:
         if self.model.form == "forward":
             return found
         numbers, folded = self.body(material, found, layouts), Folded.of(self.grid.coarser(material), material)
-        factors, wanted = reciprocal_balance.factors(numbers, folded, self.samples, _share(len(material.interfaces)))
+        factors, wanted = reciprocal_balance.factors(
+            numbers, folded, self.samples, sample_allocation.share(len(material.interfaces))
+        )
 
         def spread(values: Array) -> Array:
             return folded.grid.refined(folded.everywhere(values), self.grid)
@@ -472,7 +473,9 @@ class Solver:
         drawn, of_lobes = [], sum(energies)
         short = np.clip(rest - BRIGHTEST * whole, 0, of_lobes)
         rest, share = rest - short, 1 + ops.divide(short, of_lobes)
-        normals = self.normals or (FINELY[1] if self.finely else round(_share(len(lobes)) * NORMALS[self.isotropic]))
+        normals = self.normals or (
+            FINELY[1] if self.finely else round(sample_allocation.share(len(lobes)) * NORMALS[self.isotropic])
+        )
         for (shape, tensor, _), own in zip(lobes, energies):
             lobe = shape.lobe(1.0, tensor.roughness(folded.phi))
             z, squares, largest = refracted_lobe.integrals(lobe, folded.directions, normals)
@@ -752,11 +755,6 @@ def _cloudy(material: Material) -> set[int]:
 def sides(material: Material) -> list[Material]:
     """A material as it is seen from above and, where it transmits, from below."""
     return [material, material.reversed()] if material.transmits else [material]
-
-
-def _share(parts: int) -> float:
-    """Share of the usual samples that each of some parts has: less where there are many, so that time stays bounded."""
-    return min(1.0, MANY / max(parts, 1))
 
 
 def _reflects_all(found: Sequence[Part]) -> bool:

@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 
 from velatura.model import fitted
 from velatura.model.rough_interface import Facets
+from velatura.model.solved import sample_allocation
 from velatura.model.solved.energies.adding import (
     Lambert,
     Leaving,
@@ -41,6 +42,7 @@ Array = NDArray[np.floating]
 
 NODES = 24
 SAMPLES = 377  # normals
+FEW_ORDERS = 2  # of the azimuth, where more than `sample_allocation.MANY` interfaces are brushed
 MODES = 3  # of the azimuth, of the remainder
 CANCELS = 0.3  # of columns of light: a sum that is less
 INCIDENCES = np.sqrt((np.arange(8) + 0.5) / 8)  # cosines at which the remainder is known
@@ -112,7 +114,8 @@ def energies(
     around = np.concatenate([np.broadcast_to(phi, np.shape(cos_theta)), np.repeat(azimuths, len(incidences))])
     nodes = Nodes.of(indices(everything), NODES, like)
     orders = tuple(range(modes if len(incidences) else 1))
-    basis: Basis = Even.of(nodes, brushed) if brushed else Relative(nodes, orders)
+    most = FEW_ORDERS if len(brushed) > sample_allocation.MANY else None
+    basis: Basis = Even.of(nodes, brushed, most) if brushed else Relative(nodes, orders)
     setting = Setting(basis, np.sqrt(np.maximum(1 - cosines * cosines, 0)), around, samples, often, events)
 
     # Sum up the systems

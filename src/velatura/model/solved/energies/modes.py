@@ -229,10 +229,11 @@ class Even(Basis):
     last: float = 1.0
 
     @classmethod
-    def of(cls, nodes: Nodes, brushed: Sequence[tuple[float, float]]) -> Even:
-        """The modes for interfaces of such ratios of their roughnesses, at least 1, and rotations."""
+    def of(cls, nodes: Nodes, brushed: Sequence[tuple[float, float]], orders: int | None = None) -> Even:
+        """The modes for interfaces of such ratios of their roughnesses, at least 1, and rotations: of that many orders
+        at most, None for all."""
         most = max(ratio for ratio, _ in brushed)
-        faded = [(most - low) / (high - low) for low, high in RATIOS if most > low]
+        faded = [(most - low) / (high - low) for low, high in RATIOS if most > low][: orders and orders - 1]
         turns = [rotation / (np.pi / 2) for _, rotation in brushed]
         mirrored = bool(np.allclose(turns, np.round(turns), atol=SQUARE))
         return cls(nodes, tuple(range(2, 2 * len(faded) + 3, 2)), mirrored, min([1.0, *faded[-1:]]))

@@ -42,6 +42,7 @@ from velatura.films.reflectance import Films, dielectric_passing
 from velatura.model import fitted
 from velatura.model.guards import ALPHA_MIN
 from velatura.model.roughness_maps import RoughnessMap
+from velatura.model.solved import sample_allocation
 from velatura.model.solved.guards import (
     COS_IN_SLABS_MIN,
     COS_OUTSIDE_MIN,
@@ -62,6 +63,7 @@ from velatura.stack import InterfaceValues, Material, SlabValues
 from velatura.stack.chain import chain
 
 NODES = (16, 24)  # of the quadrature
+LEAST_RAYS = 12  # of these, of many brushed interfaces
 EDGE = 0.98  # of the disc of momenta that can leave, where light from beyond it is looked for
 
 #: Widths in the space where they add; they have no upper bound.
@@ -577,12 +579,14 @@ def integrals(
     ]
     u, v, rotation = (np.broadcast_to(x, i.p2.shape) for x in reduce(lambda a, b: a + b, widths).roughness(WIDTHS))
     # Cast rays from the middle
-    share, weight = low_discrepancy.gauss(nodes[0])
+    along, weight = low_discrepancy.gauss(nodes[0])
     # Both sides of the plane of incidence are alike where interfaces have no axes; elsewhere as many rays for each
-    # side, so that light does not jump between them
+    # side, so that light does not jump between them, but fewer of many interfaces, whose light is round
     alike = all(isinstance(refraction.width, Isotropic) for refraction in transmission.refractions)
-    turns = nodes[1] if alike else 2 * nodes[1]
-    phi = (np.arange(turns) + 0.5) * (pi / nodes[1])
+    share = 1.0 if alike else sample_allocation.share(len(transmission.refractions)) ** 0.5
+    half = max(round(share * nodes[1]), min(LEAST_RAYS, nodes[1]))
+    turns = half if alike else 2 * half
+    phi = (np.arange(turns) + 0.5) * (pi / half)
     rotation = np.arctan2(i.p[1], i.p[0]) if alike else rotation
     n_out = np.asarray(n[-1])
     length = np.sqrt(np.maximum(i.p2, ops.TINY))
@@ -590,7 +594,7 @@ def integrals(
     gap = (1 - bound) * length
     u, v = (np.sqrt(width**2 + gap**2 + MOMENTUM_WIDTH_MIN**2) for width in (u, v))
     middle = *(bound * x for x in i.p), u, v, np.cos(rotation), np.sin(rotation)
-    rays = np.tile(share, turns), np.tile(weight * (pi / turns), turns)
+    rays = np.tile(along, turns), np.tile(weight * (pi / turns), turns)
     around = np.repeat(np.cos(phi), nodes[0]), np.repeat(np.sin(phi), nodes[0])
     alone = Transmission(tuple(map(_numbered, transmission.refractions)), transmission.slabs, (), (), (), False, False)
     # A kernel reads what depends on wi alone, which would be a third of it to compile
