@@ -7,15 +7,23 @@ import { gzipSync } from 'node:zlib';
 import { decode } from '../../src/velatura/editor/page/arrays.js';
 import { textOf, unpacked } from '../../src/velatura/editor/page/packing.js';
 
-const file = (answer) => Uint8Array.from(gzipSync(JSON.stringify(answer)));
-const inBase64 = (bytes) => Buffer.from(bytes).toString('base64');
+const file = (answer, planes = []) =>
+  Uint8Array.from(gzipSync(Buffer.concat([Buffer.from(JSON.stringify(answer)), Buffer.from(planes.length ? [10, ...planes] : [])])));
 
 test('arrays are put together from planes, where the lowest may be left out', async () => {
-  const whole = { dtype: 'uint32', shape: [2], planes: inBase64([1, 2, 0, 1, 0, 0, 0, 0]) };
-  const floats = { dtype: 'float32', shape: [1, 2], planes: inBase64([0, 0, 0x80, 0x20, 0x3f, 0xc0]) };
-  const made = await unpacked(file({ whole, floats }));
+  const whole = { dtype: 'uint32', shape: [2], planes: [0, 8], step: 0 };
+  const floats = { dtype: 'float32', shape: [1, 2], planes: [8, 6], step: 0 };
+  const made = await unpacked(file({ whole, floats }, [1, 2, 0, 1, 0, 0, 0, 0, 0, 0, 0x80, 0x20, 0x3f, 0xc0]));
   assert.deepEqual([...decode(made.whole).array], [1, 258]);
   assert.deepEqual(decode(made.floats), { array: Float32Array.of(1, -2.5), shape: [1, 2] });
+});
+
+test('numbers are added up from differences, of those a step before', async () => {
+  const whole = { dtype: 'int16', shape: [2, 2], planes: [0, 8], step: 2 };
+  const floats = { dtype: 'float32', shape: [2], planes: [8, 6], step: 1 };
+  const made = await unpacked(file({ whole, floats }, [10, 255, 246, 2, 0, 255, 255, 0, 0, 0, 0x80, 0, 0x3f, 0x80]));
+  assert.deepEqual([...decode(made.whole).array], [10, -1, 0, 1]);
+  assert.deepEqual([...decode(made.floats).array], [1, -1]);
 });
 
 test('steps of a tape name all that is before them by number', async () => {
