@@ -18,7 +18,7 @@ from typing import Any
 import chromium
 import numpy as np
 import pytest
-from editor import Server, Tabs, Visit, unexpected
+from editor import Server, Tabs, Visit, drag, unexpected
 
 import velatura as vt
 from velatura.editor import appearance
@@ -73,17 +73,6 @@ def answered(visit: Visit) -> None:
     """Wait until what was dragged has been answered, drawn, and made one step."""
     visit.settled()
     visit.page.wait_for_function("() => !velatura.store.dragging")
-
-
-# At once, since the page may write its own value meanwhile
-MOVE = "(slider, tick) => { slider.value = tick; slider.dispatchEvent(new Event('input', { bubbles: true })); }"
-
-
-def drag(slider: Any, ticks: tuple[int, ...]) -> None:
-    """Drag a slider over its ticks as a hand does: a change follows where it is let go."""
-    for tick in ticks:
-        slider.evaluate(MOVE, tick)
-    slider.dispatch_event("change")
 
 
 # Moves a slider and lets go, and does so once more when the first answer, an approximate one, is drawn

@@ -242,6 +242,17 @@ class Tabs:
         return ended
 
 
+# At once, since the page may write its own value meanwhile
+MOVE = "(slider, tick) => { slider.value = tick; slider.dispatchEvent(new Event('input', { bubbles: true })); }"
+
+
+def drag(slider: Any, ticks: tuple[int, ...]) -> None:
+    """Drag a slider over its ticks as a hand does: a change follows where it is let go."""
+    for tick in ticks:
+        slider.evaluate(MOVE, tick)
+    slider.dispatch_event("change")
+
+
 def difference(a: np.ndarray, b: np.ndarray) -> float:
     """The mean difference of two pictures."""
     return float(np.mean(np.abs(a - b)))

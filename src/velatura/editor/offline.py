@@ -1,8 +1,8 @@
 """The editor as a folder of files that any web server can host: the page, and the answers that it needs of Python.
 
 Answers are those of the verbs of `velatura.editor.service`, worked out once, each in a file of `packing.py`. Shaders
-are those of all orders of a few layers, in closed form, whose values the page sets; presets lie there solved as well.
-The page finds them by `page/offline.js`.
+are those of all orders of a few layers, in closed form, whose values the page sets; presets lie there solved as well,
+with tables by which the page interpolates about them (`tabulated.py`). The page finds them by `page/offline.js`.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 from velatura import files
-from velatura.editor import bundle
+from velatura.editor import bundle, tabulated
 from velatura.editor.messages import Answer, document
 from velatura.editor.packing import numbered, packed
 from velatura.editor.service import ENVIRONMENTS, VERBS
@@ -187,6 +187,7 @@ def _tasks(plain: Sequence[Order], models: Sequence[Model]) -> list[Callable[[],
         *(functools.partial(_coated, model, name) for model in models for name in coated),
         *(functools.partial(_shader, model.name, order) for model in models for order in [*plain, *brushed]),
         *(functools.partial(_solved, model, name) for model in solved for name in presets(mixtures=False)),
+        *(functools.partial(_tabulated, model, name) for model in solved for name in presets(mixtures=False)),
     ]
 
 
@@ -220,12 +221,18 @@ def _common(refusals: Mapping[Order, str], models: Sequence[Model]) -> dict[str,
     offered = {
         "models": [each for each in begun["models"] if each["name"] in names],
         "environments": environments,
-        "presets": [each for each in begun["presets"] if "mix" not in each["material"]],
+        "presets": [_followed(each) for each in begun["presets"] if "mix" not in each["material"]],
         "orders": {order.name: refusal for order, refusal in refusals.items()},
     }
     objects = {f"{DATA}/object/{name}.pack": packed(VERBS["object"]({"name": name})) for name in OBJECTS}
     lights = {f"{DATA}/environment/{name}.pack": packed(VERBS["environment"]({"name": name})) for name in ENVIRONMENTS}
     return {SESSION: packed({**begun, **offered}), **objects, **lights}
+
+
+def _followed(known: Answer) -> Answer:
+    """A preset of the session, with the flat names of values that its table follows."""
+    along = tabulated.axes(preset(known["name"])) if known["name"] in presets(mixtures=False) else []
+    return {**known, "followed": sorted({name for axis in along for name in axis.names})}
 
 
 def _refusals(layers: int) -> dict[Order, str]:
@@ -269,6 +276,11 @@ def _solved(model: str, name: str) -> Made:
     """A preset as it is solved."""
     answer = VERBS["shader"]({"material": document(preset(name)), "model": model})
     return Made({f"{DATA}/solved/{model}/{name}.pack": packed(answer)})
+
+
+def _tabulated(model: str, name: str) -> Made:
+    """What the page interpolates by, about a preset."""
+    return Made({f"{DATA}/tabulated/{model}/{name}.pack": packed(tabulated.tabulated(preset(name), named(model)))})
 
 
 def _coated(model: Model, name: str) -> Made:

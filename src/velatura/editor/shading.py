@@ -152,6 +152,12 @@ def _solution(pattern: Described, model: Model, number: int, stack: Stack, coars
     return tabulated.solve(stack, coarse)
 
 
+def solved_look_up(stack: Stack, model: Model) -> SolvedLookUp | None:
+    """The look-up of the code that `shading` makes of a stack, where it is solved."""
+    stretched = any(isinstance(layer.alpha, tuple) for layer in stack.interfaces)
+    return _solved(_made(pattern(stack, [stretched]), model).parts[0])
+
+
 def _free(material: Described, made: Shader) -> list[tuple[Address, Any]]:
     return [(at, x) for at, x in material.values() if at.name in made.uniforms and not isinstance(x, Varying)]
 

@@ -8,6 +8,7 @@ import { Recent } from './recent.js';
 import { check } from './state/check.js';
 import { flat, stateOf, variantOf } from './state/material.js';
 import { contentsOf } from './state/picture.js';
+import { interpolated, read as readTable } from './tabulated.js';
 
 const KEPT = 64; // answers
 const WIDTH = 1024; // texels in a line of tables
@@ -26,9 +27,19 @@ function texelsOf({ array, shape }) {
 /** A client of the files in a folder: `call(verb, body)`, and `lacks(name)`, why a verb or another thing is not there, or ''. */
 export async function connectFiles(folder) {
   const kept = new Recent(KEPT);
-  const load = (name) => kept.once(name, () => fetched(`${folder}${name}.pack`));
+  const load = (name, read = (answer) => answer) => kept.once(name, () => fetched(`${folder}${name}.pack`).then(read));
   const session = await load('session');
   const { orders } = session;
+  // Presets whose values may move: their names, order of layers, values, and what else they have
+  const followed = session.presets
+    .filter(({ followed: names }) => names?.length)
+    .map(({ name, followed: names, material }) => ({
+      name,
+      names,
+      order: orderOf(material),
+      values: flat(stateOf(material), session),
+      others: othersOf(material),
+    }));
 
   /** The name of a material's order of layers. Raises Refused where there is no material of that order. */
   function orderOf(material) {
@@ -51,15 +62,33 @@ export async function connectFiles(folder) {
     return stateOf(material);
   }
 
-  /** The preset of a model that is solved, as it was solved; else the shader in closed form, as it is for `coarse`. */
+  /** The shader of a material by stored solutions, where its model is solved; else in closed form, as it is for `coarse`. */
   async function shader({ material, model, switches = {}, coarse = false }) {
     if (Object.keys(switches).length) throw refused('Switches of a model need Python: velatura edit.');
     const order = orderOf(material), films = filmsOf(material);
     const found = films ? await load(coated(model, films, order)) : await plain(model, order);
     if (found.refused) throw refused(found.refused);
+    const solved = found.closed_form && !coarse && (await solvedAs(material, model, order));
+    return solved || { ...found, values: contentsOf(found, read(material), session).values };
+  }
+
+  /** A preset as it was solved, or what lies between solutions of one; null of other materials. */
+  async function solvedAs(material, model, order) {
     const preset = session.presets.find((known) => isSame(known.material, material));
-    if (found.closed_form && preset && !coarse) return load(`solved/${model}/${preset.name}`);
-    return { ...found, values: contentsOf(found, read(material), session).values };
+    if (preset) return load(`solved/${model}/${preset.name}`);
+    const state = read(material), values = flat(state, session), others = othersOf(material);
+    const near = followed
+      .filter((known) => known.order === order && known.others === others)
+      .map((known) => ({ ...known, moved: movedOf(known.values, values) }))
+      .filter(({ moved, names }) => moved.every((name) => names.includes(name)))
+      .sort((a, b) => a.moved.length - b.moved.length);
+    for (const { name, values: own, moved } of near) {
+      const [solved, table] = await Promise.all([load(`solved/${model}/${name}`), load(`tabulated/${model}/${name}`, readTable)]);
+      const follows = moved.every((value) => table.follows.has(value));
+      const solution = follows && interpolated(table, solved.solution, own, values);
+      if (solution) return { ...solved, values: contentsOf(solved, state, session).values, solution, interpolated: true };
+    }
+    return null;
   }
 
   /** The shader of an order of layers, whose lines it has in common with others. */
@@ -159,6 +188,16 @@ function filmsOf({ layers, exterior = 1, thin = false }) {
     return [kind, eta, k, conductor, films];
   });
   return parts.some(([, , , , films]) => films?.length) ? JSON.stringify([exterior, thin, parts]) : '';
+}
+
+/** What a material has besides numbers, as text. */
+const othersOf = ({ layers }) =>
+  JSON.stringify(layers.map((entry) => Object.values(entry)).map(([keys]) => [keys?.films ?? [], keys?.phase, keys?.pigments ?? []]));
+
+/** The flat names of values that differ between two materials of one order. */
+function movedOf(before, after) {
+  const colour = (value) => String(Array.isArray(value) ? value : [value, value, value]);
+  return Object.keys({ ...before, ...after }).filter((name) => colour(before[name]) !== colour(after[name]));
 }
 
 /** A number, or a colour, as GLSL has it. */

@@ -25,7 +25,7 @@ from velatura.model.base import Body
 from velatura.model.context import Context, at_a_point
 from velatura.model.solved import rotation_frame, solve, wide_light
 from velatura.model.solved.bsdf import Side, Solved
-from velatura.model.solved.columns import WIDE_SIDES, Columns
+from velatura.model.solved.columns import WIDE_SIDES, Columns, Declaration
 from velatura.model.solved.lobes import top_medium, wide
 from velatura.model.solved.lobes.remainder import Remainder
 from velatura.model.solved.lobes.top_medium import PassedMedium, TopMedium
@@ -39,7 +39,7 @@ from velatura.ops import Value
 from velatura.optics import ggx
 from velatura.optics.ggx import Direction
 from velatura.optics.phase import HenyeyGreenstein, PhaseFunction, TwoLobes
-from velatura.shader.lookups.lookup import Group, LookUp, Texels, sides_read, texture, together
+from velatura.shader.lookups.lookup import Group, LookUp, Texels, sides_read, texture, together, untextured
 from velatura.shader.recorder.seen import Seen
 from velatura.shader.recorder.symbol import LAYOUT, REMAINDER, SHOWN, colour, number
 from velatura.stack import InterfaceValues, Material, MediumValues, SlabValues, Stack
@@ -106,7 +106,7 @@ class SolvedLookUp(LookUp):
             found |= {f"reflected[{k}].{part}": value for part, value in parts.items()}
         found |= {"remainder": columns.scale, "remainder_chance": columns.chance}
         if columns.passes:
-            names = self.straight.above.declaration.parts
+            names = self.declaration.parts
             found |= {f"passed_{name}": getattr(columns.passes, name) for name in names}
         for side in WIDE_SIDES if columns.wide_passed else ():
             energy, *numbers = getattr(columns, side)
@@ -134,9 +134,25 @@ class SolvedLookUp(LookUp):
     def _turned_back(self, w: Direction) -> Direction:
         return w if self.angle is None else ggx.rotate(w, self.angle)
 
-    def solve(self, stack: Stack, coarse: bool = False) -> SolvedContents:
-        """A stack of this kind. A `coarse` one is quicker, and is for light from above alone: that from below has the
-        same columns where a program reads one side at a time."""
+    @property
+    def declaration(self) -> Declaration:
+        """That of the columns of each side."""
+        return self.straight.above.declaration
+
+    def rows(self, solved: SolvedContents) -> Array:
+        """Columns of a stack of this kind, where all have a place: (rows, sides, nodes over the cosine, and over the
+        azimuth)."""
+        channels = untextured(solved.texels, self.groups, self.sides, self.nodes)
+        return channels[[int(place) for place in self.places]]
+
+    def is_alike(self, a: SolvedContents, b: SolvedContents) -> bool:
+        """Whether light takes the same ways in two stacks of this kind: they differ in numbers alone."""
+        turned = int(self.angle is not None)
+        return bool(np.array_equal(a.layout[turned:], b.layout[turned:]))
+
+    def solve(self, stack: Stack, coarse: bool = False, both: bool = False) -> SolvedContents:
+        """A stack of this kind. A `coarse` one is quicker, and is for light from above alone, unless for that from
+        `both` sides: that from below has the same columns where a program reads one side at a time."""
         numbers, frame = _numbers(stack)
         material = frame.back(numbers)
         solver = replace(self.solver, variance=frame.kind(self.solver.variance))
@@ -146,7 +162,7 @@ class SolvedLookUp(LookUp):
         # All that its kind may draw, of its own shape
         own = [_of_kind(layout, kind) for layout, kind in zip(solver.layouts([material]), self.layouts)]
         solver = replace(solver, wide=solver.wide and wide.share(material) > 0)
-        if coarse and solver.model.form == "forward":
+        if coarse and not both and solver.model.form == "forward":
             found = solver.solve(material, own[:1]) * self.sides
         else:
             found = solver.solve(material, own)

@@ -77,6 +77,12 @@ def texture(columns: Iterable[tuple[int, Array]], groups: Sequence[Group], sides
     return filled.reshape(-1, 4, *filled.shape[1:]).transpose(0, 2, 4, 3, 1).reshape(-1, nodes[0], 4)
 
 
+def untextured(texels: Array, groups: Sequence[Group], sides: int, nodes: tuple[int, ...]) -> Array:
+    """The columns in a texture of groups, (places, sides, nodes over the cosine, and over the azimuth)."""
+    filled = texels.reshape(_texels(groups), sides, prod(nodes[1:]), nodes[0], 4)
+    return filled.transpose(0, 4, 1, 3, 2).reshape(-1, sides, nodes[0], prod(nodes[1:]))
+
+
 def stacked(textures: Sequence[Array]) -> Array | None:
     """Textures in one, each below the one before; None without any."""
     width = max((texels.shape[1] for texels in textures), default=0)

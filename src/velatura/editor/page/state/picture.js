@@ -164,9 +164,9 @@ class Slot {
     if (shader.key !== this.shader?.key) {
       this.stage = 'compiling';
       await viewport.setMaterial(this.#name, shader, contentsNow());
-      this.shader = shader;
       this.given = state;
     }
+    this.shader = shader; // by one program, solutions may be interpolated or not
     this.drawn = shape;
     this.#settled = !this.#wanted;
     if (shape === this.#shape) this.#setContents(contentsNow(), isWorkedOut(shader) ? state : this.#state);
