@@ -266,6 +266,14 @@ class InHlsl(InVulkan):
         return spirv(_UNFILTERED + text, "-Od", "-D", "-V", "-e", "main")
 
 
+class InHlslBySlang(InHlsl):
+    """HLSL as Slang's compiler hands it on, where the device takes functions of textures; both compile it."""
+
+    def code(self, text: str) -> bytes:
+        super().code(text)
+        return _slang(_UNFILTERED + text, HLSL)
+
+
 class InSlang(InHlsl):
     printer = Slang()
 

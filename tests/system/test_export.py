@@ -58,7 +58,8 @@ def test_python_exports_what_the_command_writes(run: Run, tmp_path: Path, monkey
     files = {path.name for path in tmp_path.iterdir()}
     endings = "glsl", "hlsl", "js", "osl", "slang", "tres", "wgsl", "mtlx", "py", "xml"
     described = {f"gold.{ending}" for ending in endings}
-    assert files == described | {f"{name}.json" for name in described} | {"gold.json", "gold.tables.bin"}
+    beside = {f"gold.{ending}" for ending in ("json", "tables.bin", "cs", "ush", "exr")}
+    assert files == described | {f"{name}.json" for name in described} | beside
     with pytest.raises(vt.InvalidInput, match="unknown format 'oslo'"):
         vt.export("coated-gold", "oslo")
     with pytest.raises(vt.InvalidInput, match=r"constant: only for glsl, .*wgsl.*, not for json"):
@@ -119,7 +120,7 @@ def test_facts_state_the_loss_that_the_file_states(to: str, tmp_path: Path) -> N
     assert all(number in text for number in stated)
 
 
-@pytest.mark.parametrize("to", ["three", "babylon", "godot"])
+@pytest.mark.parametrize("to", ["three", "babylon", "godot", "unity", "unreal"])
 def test_engines_refuse_textures_in_one_line(
     to: str, run: Run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -148,7 +149,7 @@ def test_code_says_where_it_comes_from(run: Run, monkeypatch: pytest.MonkeyPatch
     first, second = out.split("\n")[:2]
     assert first == "// Coated brushed gold, by the model belcour2018 (tir=off); Slang."
     assert second == f"// Velatura {vt.__version__}, 2023-11-14; SPDX-License-Identifier: BSD-3-Clause"
-    assert (status, err) == (0, "not written without -o: the tables that the code reads (.tables.bin)\n")
+    assert (status, err) == (0, "not written without -o: what lies beside it (.tables.bin)\n")
 
 
 def test_names_and_bindings_may_be_chosen(run: Run) -> None:

@@ -41,7 +41,8 @@ CONTROL = ["\n", "\r", "a\0", "\x1b[2J", "\x7f", "\x85", "\u2028", "\u2029", "\u
 MODEL = "belcour2018"
 
 TEXTS = [name for name, each in FORMATS.items() if each.is_text]
-PAINTED = [name for name in TEXTS if name not in ("bsdf-xml", "three", "babylon", "godot")]  # which have no textures
+UNIFORM = "bsdf-xml", "three", "babylon", "godot", "unity", "unreal"  # which have no textures
+PAINTED = [name for name in TEXTS if name not in UNIFORM]
 
 Structure = Callable[[str], Any]
 
@@ -122,6 +123,11 @@ def structure(to: str) -> Structure:
     return STRUCTURES.get(FORMATS[to].endings[0], of_code)
 
 
+def beside(made: vt.exports.Export) -> dict[str, str]:
+    """Code that lies beside a file, by ending."""
+    return {end: of_code(data.decode()) for end, data in made.beside.items() if end in (".cs", ".ush")}
+
+
 @pytest.fixture(autouse=True)
 def fitted_once(monkeypatch: pytest.MonkeyPatch) -> None:
     """Parameters and matrices do not depend on names; they are fitted once for a target, or are 0."""
@@ -161,14 +167,15 @@ def texts(value: Any) -> Iterator[str]:
 
 @pytest.mark.parametrize("to", TEXTS)
 def test_names_do_not_change_the_structure_of_files(to: str) -> None:
-    """Expected: the structure of a harmless name, and in JSON the name itself."""
-    read = structure(to)
-    expected = read(vt.export(painted(), to, MODEL).text)
+    """Expected: the structure of a harmless name, and in JSON the name itself; the same code beside the file."""
+    read, harmless = structure(to), vt.export(painted(), to, MODEL)
+    expected, others = read(harmless.text), beside(harmless)
     for name in HOSTILE:
-        text = vt.export(painted(name), to, MODEL).text
-        assert read(text) == expected, name
+        made = vt.export(painted(name), to, MODEL)
+        assert read(made.text) == expected, name
+        assert beside(made) == others, name
         if read is of_json:
-            assert name in texts(json.loads(text))
+            assert name in texts(json.loads(made.text))
 
 
 @pytest.fixture(scope="module")

@@ -106,7 +106,7 @@ def export(
     if output is None:
         print(made.text, end="")
         if unwritten := [*made.beside, *map(str, made.apart)]:
-            print(f"not written without -o: the tables that the code reads ({', '.join(unwritten)})", file=sys.stderr)
+            print(f"not written without -o: what lies beside it ({', '.join(unwritten)})", file=sys.stderr)
         return
     path, *others = written
     print(path if not others else f"{path}, and beside it {', '.join(map(str, others))}")

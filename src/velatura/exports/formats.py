@@ -59,6 +59,8 @@ FORMATS: dict[str, Format] = {
     "three": Format((".js", ".mjs"), "velatura.exports.three"),
     "babylon": Format((".js", ".mjs"), "velatura.exports.babylon"),
     "godot": Format((".tres",), "velatura.exports.godot"),
+    "unity": Format((".hlsl",), "velatura.exports.unity", (".cs",), frozenset({"prefix"})),
+    "unreal": Format((".py",), "velatura.exports.unreal", (".ush", ".exr"), frozenset({"prefix"})),
     "mtlx": Format((".mtlx",), "velatura.exports.mtlx"),
     "json": Format((".json",), "velatura.exports.json", has_facts=False),
     "mitsuba-xml": Format((".xml",), "velatura.exports.mitsuba_xml"),
@@ -99,6 +101,7 @@ def export(
         to: one of `FORMATS`: a shader in "glsl" (ES 3.00), "glsl450", "vulkan" (GLSL), "hlsl", "slang" or "wgsl"; a
             shader of closures, "osl", or "blender", a script that makes a material of it; "mtlx", a graph of MaterialX;
             "three" and "babylon", modules with a material for three.js and Babylon.js; "godot", a material of Godot 4;
+            "unity", a function for Shader Graph; "unreal", a script that makes a material of Substrate's slabs;
             "json", the material with its numbers; "mitsuba-xml", a scene to be included; "python", a script that
             renders it; "bsdf", a measurement that Mitsuba's plugin `measured` loads; "bsdf-xml", matrices for WINDOW
             and Radiance; fitted parameters in "openpbr", "gltf", "gltf-coat", "usd" (OpenPBR and UsdPreviewSurface, and

@@ -22,8 +22,9 @@ from velatura.shader import Shader, prefiltered, shader
 from velatura.shader.closures import shares
 from velatura.shader.material import title
 from velatura.shader.prefiltered import Prefiltered
+from velatura.shader.printers.c_like import CLike
 from velatura.shader.printers.glsl import Glsl
-from velatura.shader.program import described
+from velatura.shader.program import PREFIX, described
 from velatura.shader.recorder import recording
 from velatura.stack import Material, Varying
 
@@ -44,8 +45,8 @@ class Environment:
 
 @dataclass(frozen=True)
 class Lit:
-    """A material in an engine: its shader; code in GLSL of the model and of the frame; textures by name, of shape
-    (height, width, 4); whether both of its sides are seen."""
+    """A material in an engine: its shader; code of the model in a language, and of the frame in GLSL; textures by name,
+    of shape (height, width, 4); whether both of its sides are seen."""
 
     shader: Shader
     code: str
@@ -59,8 +60,8 @@ class Lit:
         return replace(self, code=_without_comments(self.code), frame=_without_comments(self.frame))
 
 
-def lit(request: Request, printer: Glsl) -> Lit:
-    """The parts of a material that a module for an engine holds.
+def lit(request: Request, printer: CLike) -> Lit:
+    """The parts of a material that a module for an engine holds, with the prefix that is asked for.
 
     Raises:
         InvalidInput: a material with textures.
@@ -68,14 +69,15 @@ def lit(request: Request, printer: Glsl) -> Lit:
     varying = [address.name for address, value in request.material.values() if isinstance(value, Varying)]
     if varying:
         raise InvalidInput(f"{varying[0]}: {request.to} is written of uniform materials, without textures")
-    made = shader(request.material, request.model, printer=printer, baking=True)
+    prefix = request.options.get("prefix", PREFIX)
+    made = shader(request.material, request.model, printer=printer, prefix=prefix, baking=True)
     stacks = [stack for _, stack in request.material.leaves()]
     brushed = any(recording.variance(stack) is not Isotropic for stack in stacks)
     return Lit(
         made,
         made.text.replace(printer.first_lines, "", 1),
         _FRAME.format(tangent=_TANGENT if brushed else ""),
-        {} if made.columns is None else {"vt_baked": made.columns},
+        {} if made.columns is None else {f"{prefix}_baked": made.columns},
         any(stack.transmits for stack in stacks),
     )
 
@@ -128,6 +130,19 @@ def _without_comments(code: str) -> str:
 def halves(texels: np.ndarray) -> str:
     """A texture as halves of floats, in base64."""
     return base64.b64encode(np.ascontiguousarray(texels, "<f2").tobytes()).decode()
+
+
+# Functions that look a texture up, where they are defined, at the begin of a line, and where they are called
+_READER = re.compile(r"(^\w+ )?\b(\w+_(?:column|baked_texel|lobes|energies))\(", re.MULTILINE)
+
+
+def handed(code: str, texture: str, argument: str) -> str:
+    """Code whose functions are given their texture, which they declare as an argument."""
+
+    def given(found: re.Match[str]) -> str:
+        return f"{found[1] or ''}{found[2]}({argument if found[1] else texture}, "
+
+    return _READER.sub(given, code)
 
 
 # Modules of JavaScript -----------------------------------------------------------------------------------------------

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+from typing import Any
+
 import numpy as np
 
 from velatura.optics import fresnel
@@ -36,32 +39,9 @@ def value(given: Values, pair: ViewAndLight, thin: bool = True) -> Array:
     mean = float(np.sqrt(au * av))
     lobe = pair.reflected * closures.microfacets(pair, au, av, turn)
 
-    # Index of the dielectric base under the coat, scaled by its weight
-    ratio = v["specular_ior"] / v["coat_ior"]
-    eta = (1 - coat) * v["specular_ior"] + coat * max(ratio, 1 / ratio)
-    epsilon = np.sign(eta - 1) * np.sqrt(np.clip(v["specular_weight"] * fresnel.normal_incidence(eta), 0, 0.99999))
-    eta = float((1 + epsilon) / (1 - epsilon))
-
     # Metal, and dielectric over a diffuse or transparent base
-    reflectance = v["base_weight"] * base
-    f_metal = closures.tinted(pair.cos_d, reflectance, specular)
-    f_dielectric = np.broadcast_to(fresnel.dielectric(pair.cos_d, eta), (3, len(cos_i)))
-    if v["thin_film_weight"] > 0 and v["thin_film_thickness"] > 0:
-        n, nm, share = v["thin_film_ior"], 1000 * v["thin_film_thickness"], v["thin_film_weight"]
-        root = np.sqrt(np.clip(reflectance, 0.01, 0.99))
-
-        def metal(cosine: Array) -> tuple[Array, Array]:
-            f = closures.tinted(cosine, reflectance, specular)
-            return f, f
-
-        films = [
-            closures.film(pair.cos_d, n, nm, closures.below_film(reflectances, index, n))
-            for reflectances, index in (
-                (metal, (1 + root) / (1 - root)),
-                (closures.dielectric_below(eta / n), np.full((3, 1), eta)),
-            )
-        ]
-        f_metal, f_dielectric = ((1 - share) * f + share * g for f, g in zip((f_metal, f_dielectric), films))
+    eta = base_index(v)
+    f_metal, f_dielectric = reflectances(v, pair.cos_d, eta)
     metal_part = v["specular_weight"] * f_metal * closures.compensation(cos_i, mean, f_metal) * lobe
     shown = closures.compensation(cos_i, mean, f_dielectric)
     over = specular * f_dielectric * shown * lobe
@@ -75,12 +55,49 @@ def value(given: Values, pair: ViewAndLight, thin: bool = True) -> Array:
 
     # Coat: darkening, absorption, and its own reflection on top
     eta_c = v["coat_ior"]
-    f_0 = fresnel.normal_incidence(eta_c)
-    inside = 1 - (1 - f_0) / eta_c**2
-    metal_albedo = base * v["specular_weight"]
-    estimate = (1 - v["base_metalness"]) * base + v["base_metalness"] * metal_albedo
-    share = coat * v["coat_darkening"]
-    darkening = (1 - share) + share * (1 - inside) / (1 - estimate * inside)
     au, av = closures.anisotropic(*alphas(v["coat_roughness"], v["coat_roughness_anisotropy"]))
     top, passed = closures.coat(pair, coat, eta_c, au, av, coat_turn)
-    return np.asarray(top + passed * darkening * ((1 - coat) + coat * coat_tint) * substrate)
+    return np.asarray(top + passed * darkening(v) * ((1 - coat) + coat * coat_tint) * substrate)
+
+
+def base_index(v: Mapping[str, Any]) -> float:
+    """The index of the dielectric base over what is on it, a coat in part, scaled by its weight."""
+    coat, ratio = v["coat_weight"], v["specular_ior"] / v["coat_ior"]
+    eta = (1 - coat) * v["specular_ior"] + coat * max(ratio, 1 / ratio)
+    epsilon = np.sign(eta - 1) * np.sqrt(np.clip(v["specular_weight"] * fresnel.normal_incidence(eta), 0, 0.99999))
+    return float((1 + epsilon) / (1 - epsilon))
+
+
+def reflectances(v: Mapping[str, Any], cosine: Array, eta: float) -> tuple[Array, Array]:
+    """Reflectances (3, N) of facets of the metal and of the dielectric base, whose index is eta, with their film."""
+    base, specular = (np.reshape(v[name], (3, 1)) for name in ("base_color", "specular_color"))
+    reflectance = v["base_weight"] * base
+    f_metal = closures.tinted(cosine, reflectance, specular)
+    f_dielectric = np.broadcast_to(fresnel.dielectric(cosine, eta), (3, len(cosine)))
+    if v["thin_film_weight"] > 0 and v["thin_film_thickness"] > 0:
+        n, nm, share = v["thin_film_ior"], 1000 * v["thin_film_thickness"], v["thin_film_weight"]
+        root = np.sqrt(np.clip(reflectance, 0.01, 0.99))
+
+        def metal(cosine: Array) -> tuple[Array, Array]:
+            f = closures.tinted(cosine, reflectance, specular)
+            return f, f
+
+        films = [
+            closures.film(cosine, n, nm, closures.below_film(below, index, n))
+            for below, index in (
+                (metal, (1 + root) / (1 - root)),
+                (closures.dielectric_below(eta / n), np.full((3, 1), eta)),
+            )
+        ]
+        f_metal, f_dielectric = ((1 - share) * f + share * g for f, g in zip((f_metal, f_dielectric), films))
+    return f_metal, f_dielectric
+
+
+def darkening(v: Mapping[str, Any]) -> Array:
+    """The share (3, 1) of its colour that bounces below the coat leave to the base."""
+    base, eta = np.reshape(v["base_color"], (3, 1)), v["coat_ior"]
+    inside = 1 - (1 - fresnel.normal_incidence(eta)) / eta**2
+    metal_albedo = base * v["specular_weight"]
+    estimate = (1 - v["base_metalness"]) * base + v["base_metalness"] * metal_albedo
+    share = v["coat_weight"] * v["coat_darkening"]
+    return np.asarray((1 - share) + share * (1 - inside) / (1 - estimate * inside))

@@ -19,6 +19,8 @@ const GROUPS = {
     three: 'three.js, material',
     babylon: 'Babylon.js, material',
     godot: 'Godot 4, material',
+    unity: 'Unity, Shader Graph function',
+    unreal: 'Unreal 5, Substrate slabs',
     mtlx: 'MaterialX, by closures',
     'mitsuba-principled': 'Mitsuba 3, principled',
     'mitsuba-xml': 'Mitsuba 3, this plugin',
