@@ -74,7 +74,7 @@ class Interpolated:
         return tabulated.tabulated(self.stack, self.model)
 
     def at(self, stacks: Sequence[Stack]) -> list[SolvedContents | None]:
-        """What the page makes of stacks of the same kind; None of those that are beyond."""
+        """Solutions that the page makes of stacks of the same kind; None of those that are beyond."""
         solution = {name: array(x) for name, x in vars(self.own).items()}
         question = {"table": self.table, "solution": solution, "own": flat(self.stack), "values": [*map(flat, stacks)]}
         asked = json.dumps({"tapes": [], "materials": [], "interpolated": [question]})

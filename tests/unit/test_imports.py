@@ -66,7 +66,7 @@ IMPORTED_BY = {
     "exports": "__init__ cli editor",
     "imports": "__init__ cli editor",
     "figures": "cli editor",
-    "overview": "__init__ cli",
+    "overview": "__init__ cli editor",
     "sweeps": "__init__ cli",
 }
 

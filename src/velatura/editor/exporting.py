@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from velatura import exports, overview
+from velatura import exports
 from velatura.editor.messages import Answer, Body, Verb, array, field, material_of, model_of
 from velatura.imports import FORMATS
 from velatura.programs import BAKED
@@ -43,6 +43,8 @@ def export(body: Body) -> Answer:
     """
     to = field(body, "to", str)
     if to in PAGES:
+        from velatura import overview  # it loads SciPy
+
         ending = PAGES[to]
         drawn = overview.page(material_of(body), ending.removeprefix("."), model_of(body))
         return {"picture": _packed({ending: drawn})[ending], "ending": ending}

@@ -279,7 +279,7 @@ def _solved(model: str, name: str) -> Made:
 
 
 def _tabulated(model: str, name: str) -> Made:
-    """What the page interpolates by, about a preset."""
+    """The table by which the page interpolates about a preset."""
     return Made({f"{DATA}/tabulated/{model}/{name}.pack": packed(tabulated.tabulated(preset(name), named(model)))})
 
 

@@ -99,7 +99,7 @@ class Row(NamedTuple):
 
 
 def tabulated(stack: Stack, model: Model) -> Answer:
-    """What the page interpolates by: no axes of a stack that is not solved."""
+    """The table by which the page interpolates: no axes of a stack that is not solved."""
     look = solved_look_up(stack, model)
     if look is None:
         return {"axes": []}
@@ -139,7 +139,7 @@ def _rows(look: SolvedLookUp, columns: Array) -> list[Row]:
 
 
 def _changing(rows: Sequence[Row], columns: Array) -> Array:
-    """What of columns (nodes, rows, ...) changes along an axis, in its units."""
+    """Changes of columns (nodes, rows, ...) along an axis, in its units."""
     weights = (1.0 if row.weight is None else columns[:, row.weight] for row in rows)
     return np.stack([columns[:, k] * weight / rows[k].unit for k, weight in enumerate(weights)], axis=1)
 

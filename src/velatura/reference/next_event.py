@@ -87,7 +87,7 @@ class WayOut:
 
 @dataclass(frozen=True)
 class _Crossing:
-    """What a surface on the way does to light where it and all before it are smooth, else 0: colours or matrices.
+    """Effects of a surface on the way on light where it and all before it are smooth, else 0: colours or matrices.
 
     It reflects light from above and from below, or lets it pass to and fro, each time through the slab it comes from.
     """
