@@ -163,7 +163,7 @@ def check_writable(path: Path, to: str) -> None:
     if FORMATS[to].has_facts:
         files.check_writable(facts_beside(path), "what belongs beside it", (".json",))
     for ending in FORMATS[to].beside:
-        files.check_writable(path.with_suffix(ending), "what belongs beside it", (Path(ending).suffix,))
+        files.check_writable(path.with_suffix(ending), "what belongs beside it", (Path(f"_{ending}").suffix,))
 
 
 def taking(option: str) -> list[str]:
