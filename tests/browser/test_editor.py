@@ -1017,6 +1017,7 @@ def test_what_is_exported_is_seen_before_it_is_taken(visit: Open, tmp_path: Path
     formats = page.page.get_by_label("Format", exact=True)
     assert formats.locator("optgroup").evaluate_all("all => all.map(({ label }) => label)") == [
         "Programs",
+        "One page",
         "Parameters",
         "Shader code",
     ]

@@ -271,7 +271,12 @@ GREY = vt.Stack([vt.Interface(eta=1.5, alpha=0.2), vt.Medium(depth=0.5), vt.Inte
 
 @pytest.mark.parametrize("plugin", ["velatura", "reference", "weidlich_wilkie"])
 def test_all_variants_give_a_grey_material_one_value(plugin: str, variant: str) -> None:
-    """Expected: the value of `llvm_ad_rgb`, `sample` included, to rounding; light that was polarised is so no more."""
+    """Expected: the value of `llvm_ad_rgb`, `sample` included, to rounding; light that was polarised is so no more.
+
+    The reference polarises light in such variants, between its bounces too; `test_exact_polarised.py` measures it.
+    """
+    if plugin == "reference" and mi.variant().endswith("polarized"):
+        pytest.skip("the reference returns matrices of polarised light")
 
     def seen() -> list[np.ndarray]:
         bsdf, ctx, si = vt.bsdf(GREY, model=plugin), mi.BSDFContext(), dr.zeros(mi.SurfaceInteraction3f)
