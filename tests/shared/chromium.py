@@ -13,7 +13,8 @@ import numpy as np
 
 FLAGS = (
     "--no-sandbox --disable-gpu --use-angle=swiftshader --enable-unsafe-swiftshader --disable-quic --no-first-run "
-    "--disable-background-networking --disable-component-update --disable-sync"
+    "--disable-background-networking --disable-component-update --disable-sync "
+    "--enable-unsafe-webgpu --use-webgpu-adapter=swiftshader"
 )
 
 PAGE = """

@@ -29,11 +29,11 @@ Array = NDArray[np.floating]
 
 RADIUS = 0.98
 EDGE = 0.999  # of the radius: nearer to the edge, interpolated normals of a mesh are not those of the sphere
-ADDRESS = "http://engine.test/"
+ADDRESS = "https://engine.test/"  # pages without encryption have no WebGPU
 
-DRAW = """
+_SCENE = """
 async (job) => {
-  const THREE = await import('three');
+  const THREE = await import('%s');
   const { LayeredMaterial } = await import(job.module);
   const floats = new Float32Array(Uint8Array.from(atob(job.sky), (letter) => letter.charCodeAt(0)).buffer);
   const sky = new THREE.DataTexture(floats, job.width, job.height, THREE.RGBAFormat, THREE.FloatType);
@@ -41,10 +41,6 @@ async (job) => {
   sky.minFilter = sky.magFilter = THREE.LinearFilter;
   sky.wrapS = THREE.RepeatWrapping;
   sky.needsUpdate = true;
-  const renderer = new THREE.WebGLRenderer({ canvas: document.createElement('canvas') });
-  const complaints = [];
-  renderer.debug.onShaderError = (gl, program, vertex, fragment) =>
-    complaints.push(gl.getShaderInfoLog(vertex), gl.getShaderInfoLog(fragment), gl.getProgramInfoLog(program));
   const scene = new THREE.Scene(), camera = new THREE.OrthographicCamera(-1, 1, 1, -1, 0.1, 10);
   camera.position.z = 4;
   const material = new LayeredMaterial();
@@ -56,21 +52,49 @@ async (job) => {
     light.position.set(...job.light);
     scene.add(light);
   } else scene.environment = sky;
+  const complaints = [];
+%s  let text = '';
+  const bytes = new Uint8Array(pixels.buffer);
+  for (let i = 0; i < bytes.length; i += 4096) text += String.fromCharCode(...bytes.subarray(i, i + 4096));
+  return { pixels: btoa(text), complaints, revision: THREE.REVISION };
+}
+"""
+
+DRAW = _SCENE % (
+    "three",
+    """\
+  const renderer = new THREE.WebGLRenderer({ canvas: document.createElement('canvas') });
+  renderer.debug.onShaderError = (gl, program, vertex, fragment) =>
+    complaints.push(gl.getShaderInfoLog(vertex), gl.getShaderInfoLog(fragment), gl.getProgramInfoLog(program));
   const target = new THREE.WebGLRenderTarget(job.size, job.size, { type: THREE.FloatType });
   renderer.setRenderTarget(target);
   renderer.setClearColor(0, 0);
   renderer.render(scene, camera);
   const pixels = new Float32Array(4 * job.size * job.size);
   renderer.readRenderTargetPixels(target, 0, 0, job.size, job.size, pixels);
-  let text = '';
-  const bytes = new Uint8Array(pixels.buffer);
-  for (let i = 0; i < bytes.length; i += 4096) text += String.fromCharCode(...bytes.subarray(i, i + 4096));
-  const revision = THREE.REVISION;
   renderer.dispose();
   renderer.forceContextLoss();
-  return { pixels: btoa(text), complaints, revision };
-}
-"""
+""",
+)
+
+# One renderer for all balls, since it takes seconds to start; its rows come from the top
+DRAW_BY_WEBGPU = _SCENE % (
+    "three/webgpu",
+    """\
+  const renderer = (window.renderer ??= new THREE.WebGPURenderer({ canvas: document.createElement('canvas') }));
+  await renderer.init();
+  if (!renderer.backend.isWebGPUBackend) throw new Error('no WebGPU');
+  renderer.backend.device.onuncapturederror = ({ error }) => complaints.push(error.message);
+  THREE.setConsoleFunction((kind, ...parts) => complaints.push(parts.join(' ')));
+  const target = new THREE.RenderTarget(job.size, job.size, { type: THREE.FloatType });
+  renderer.setRenderTarget(target);
+  renderer.setClearColor(0, 0);
+  renderer.render(scene, camera);
+  const found = await renderer.readRenderTargetPixelsAsync(target, 0, 0, job.size, job.size);
+  const rows = Array.from({ length: job.size }, (_, k) => found.subarray(4 * job.size * k, 4 * job.size * (k + 1)));
+  const pixels = Float32Array.from(rows.reverse().flatMap((row) => [...row]));
+""",
+)
 
 
 @dataclass(frozen=True)
@@ -173,6 +197,15 @@ THREE = Engine(
     "https://unpkg.com/three@[0-9.]+/",
     """<!doctype html><script type="importmap">{"imports": {"three": "/build/three.module.js"}}</script>""",
     DRAW,
+)
+
+
+WEBGPU = Engine(
+    THREE.folder,
+    THREE.network,
+    """<!doctype html><script type="importmap">{"imports": {"three/webgpu": "/build/three.webgpu.js",
+    "three/tsl": "/build/three.tsl.js"}}</script>""",
+    DRAW_BY_WEBGPU,
 )
 
 

@@ -63,6 +63,7 @@ const environment = `
 const definitions = `
 ${{code}}
 ${{frame}}
+mat3 vt_frame;
 
 VtMaterial vt_seen;
 VtLobes vt_seen_lobes;

@@ -57,6 +57,7 @@ FORMATS: dict[str, Format] = {
     "osl": Format((".osl",), "velatura.exports.osl", options=frozenset({"constant"})),
     "blender": Format((".py",), "velatura.exports.blender"),
     "three": Format((".js", ".mjs"), "velatura.exports.three"),
+    "three-webgpu": Format((".js", ".mjs"), "velatura.exports.three_webgpu"),
     "babylon": Format((".js", ".mjs"), "velatura.exports.babylon"),
     "godot": Format((".tres",), "velatura.exports.godot"),
     "unity": Format((".hlsl",), "velatura.exports.unity", (".cs",), frozenset({"prefix"})),
@@ -100,7 +101,8 @@ def export(
         material: a stack, a mixture, a file, or a preset's name.
         to: one of `FORMATS`: a shader in "glsl" (ES 3.00), "glsl450", "vulkan" (GLSL), "hlsl", "slang" or "wgsl"; a
             shader of closures, "osl", or "blender", a script that makes a material of it; "mtlx", a graph of MaterialX;
-            "three" and "babylon", modules with a material for three.js and Babylon.js; "godot", a material of Godot 4;
+            "three", "three-webgpu" and "babylon", modules with a material for three.js, its WebGPURenderer, and
+            Babylon.js; "godot", a material of Godot 4;
             "unity", a function for Shader Graph; "unreal", a script that makes a material of Substrate's slabs;
             "json", the material with its numbers; "mitsuba-xml", a scene to be included; "python", a script that
             renders it; "bsdf", a measurement that Mitsuba's plugin `measured` loads; "bsdf-xml", matrices for WINDOW

@@ -52,7 +52,7 @@ def write(request: Request) -> Export:
         outwards="FRONT_FACING ? NORMAL : -NORMAL" if made.two_sided else "NORMAL",
         above="" if made.two_sided else "\n    wi = normalize(vec3(wi.xy, max(wi.z, 1e-3)));",
         code=made.code.strip(),
-        frame=made.frame.replace("mat3 vt_frame;", "", 1).strip(),
+        frame=made.frame.strip(),
     )
     images = "".join(_image(name, texels) for name, texels in made.textures.items())
     named = "".join(f'shader_parameter/{name} = SubResource("{name}")\n' for name in made.textures)

@@ -9,8 +9,9 @@ from __future__ import annotations
 import base64
 import json
 import re
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
 
@@ -23,23 +24,46 @@ from velatura.shader.closures import shares
 from velatura.shader.material import title
 from velatura.shader.prefiltered import Prefiltered
 from velatura.shader.printers.c_like import CLike
-from velatura.shader.printers.glsl import Glsl
 from velatura.shader.program import PREFIX, described
 from velatura.shader.recorder import recording
 from velatura.stack import Material, Varying
 
 
+class Row(NamedTuple):
+    """A row of texels over the cosine, one for each azimuth, in the texture of parts: nodes over the cosine and the
+    azimuth, less 1; rows to that of light from below; the first row."""
+
+    columns: int
+    turns: int
+    below: int
+    first: int
+
+
+class Part(NamedTuple):
+    """A part of a stack by its rows: the share of the stack, and the side that it leaves on, 1 or -1 of the view's."""
+
+    share: float
+    side: int
+    energy: Row
+    blurs: Sequence[Row]
+
+
 @dataclass(frozen=True)
 class Environment:
-    """The parts of all stacks of a material: code in GLSL ES, which calls vt_blurred(direction, root of alpha), and its
-    texture vt_parts, (height, width, 4)."""
+    """The parts of all stacks of a material, and their texture vt_parts, (height, width, 4).
+
+    `functions` are by name, in GLSL: where texels lie, and what a blur sees. `text` is the code of GLSL ES with them,
+    which calls vt_blurred(direction, root of alpha).
+    """
 
     text: str
+    functions: Mapping[str, str]
+    parts: Sequence[Part]
     texture: np.ndarray
 
     @property
     def bare(self) -> Environment:
-        """The same without comments."""
+        """The same whose text has no comments."""
         return replace(self, text=_without_comments(self.text))
 
 
@@ -49,6 +73,7 @@ class Lit:
     of shape (height, width, 4); whether both of its sides are seen."""
 
     shader: Shader
+    language: str
     code: str
     frame: str
     textures: Mapping[str, np.ndarray]
@@ -75,6 +100,7 @@ def lit(request: Request, printer: CLike) -> Lit:
     brushed = any(recording.variance(stack) is not Isotropic for stack in stacks)
     return Lit(
         made,
+        printer.language,
         made.text.replace(printer.first_lines, "", 1),
         _FRAME.format(tangent=_TANGENT if brushed else ""),
         {} if made.columns is None else {f"{prefix}_baked": made.columns},
@@ -89,38 +115,41 @@ def environment(request: Request) -> Environment:
         (share, prefiltered.prefiltered(Material.of(stack), request.model)) for share, (_, stack) in stacks if share
     ]
     widest = max(found.shape[0] for _, found in parts)
-    lines, texels, first = [], [], 0
+    placed, texels, first = list[Part](), [], 0
     for share, found in parts:
         own = prefiltered.texture(found)
-        lines += list(_part_lines(share, found, first))
+        placed += _placed(share, found, first)
         texels.append(np.pad(own, ((0, 0), (0, widest - own.shape[1]), (0, 0))))
         first += len(own)
-    texture = np.concatenate(texels)
-    azimuths = any(len(found.shape) > 1 for _, found in parts)
-    code = _ENVIRONMENT.format(parts="\n".join(lines), azimuth=_AZIMUTH if azimuths else "")
-    return Environment(code, texture)
+    azimuths = any(part.energy.turns for part in placed)
+    functions = {
+        "vt_place": _PLACE.format(azimuth=_AZIMUTH if azimuths else "    float azimuth = 0.0;\n"),
+        "vt_at": _AT,
+        "vt_ray": _RAY,
+    }
+    text = _ENVIRONMENT.format(functions="\n".join(functions.values()), parts="\n".join(map(_statement, placed)))
+    return Environment(text, functions, placed, np.concatenate(texels))
 
 
-def _part_lines(share: float, found: Prefiltered, first: int) -> Iterator[str]:
-    """Statements that add up the parts of a stack whose lines begin at a number."""
-    turns = (*found.shape, 1)[1]
+def _placed(share: float, found: Prefiltered, first: int) -> Iterator[Part]:
+    """The parts of a stack whose rows begin at a number."""
+    nodes, turns = (*found.shape, 1)[:2]
     height = turns * sum(1 + blurs.shape[2] for blurs in found.blurs)
-    sides = len(found.energy)
-
-    def texel(line: int) -> str:
-        above = f"{first + turns * line}.5"
-        chosen = f"(wi.z < 0.0 ? {first + turns * line + height}.5 : {above})" if sides > 1 else above
-        place = f"vec2(0.5 + {found.shape[0] - 1}.0 * column, {chosen}" + (
-            f" + azimuth * {turns - 1}.0)" if turns > 1 else ")"
-        )
-        return f"vt_texel({place})"
-
-    line = 0
+    below = height if len(found.energy) > 1 else 0
     for passes, blurs in zip(found.passes, found.blurs):
-        side = "-wi.z" if passes else "wi.z"
-        seen = [f"vt_blur({texel(line + 1 + k)}, wi, plane, {side})" for k in range(blurs.shape[2])]
-        yield f"    sum += {share:.6f} * {texel(line)}.rgb * ({' + '.join(seen)});"
-        line += 1 + blurs.shape[2]
+        energy, *seen = (Row(nodes - 1, turns - 1, below, first + turns * k) for k in range(1 + blurs.shape[2]))
+        yield Part(share, -1 if passes else 1, energy, seen)
+        first += turns * (1 + blurs.shape[2])
+
+
+def _statement(part: Part) -> str:
+    """A statement of GLSL that adds a part."""
+
+    def row(row: Row) -> str:
+        return f"vec4({', '.join(f'{x}.0' for x in row)})"
+
+    seen = [f"vt_blur({row(blur)}, place, wi, {part.side}.0)" for blur in part.blurs]
+    return f"    sum += {part.share:.6f} * vt_texel(vt_at({row(part.energy)}, place)).rgb * ({' + '.join(seen)});"
 
 
 def _without_comments(code: str) -> str:
@@ -159,13 +188,14 @@ def module(template: str, request: Request, made: Lit, around: Environment, make
         code=_literal(made.code),
         frame=_literal(made.frame),
         environment=_literal(around.text),
+        functions="".join(f"const {name} = `\n{_literal(text)}\n`;\n" for name, text in around.functions.items()),
         unpacked=_UNPACKED,
         textures="".join(
             _stored(name, texels) for name, texels in {"vt_parts": around.texture, **made.textures}.items()
         ),
         **own,
     )
-    facts = facts_of(made.shader, Glsl.language, request.folder)
+    facts = facts_of(made.shader, made.language, request.folder)
     return Export(text, facts={**facts, "exports": [maker, "code"]})
 
 
@@ -185,12 +215,13 @@ def _string(text: str) -> str:
 
 
 _FRAME = """\
-mat3 vt_frame; // columns are the tangent, the bitangent, and the normal outwards, in the engine's coordinates
-
-// Of a normal, a place and its texture coordinate; hand is -1 where coordinates are left-handed
+// Columns are the tangent, the bitangent, and the normal outwards, in the engine's coordinates; of a normal, a place and
+// its texture coordinate. hand is -1 where coordinates are left-handed
 mat3 vt_frame_of(vec3 n, vec3 p, vec2 uv, float hand) {{
     vec3 t = vec3(0.0);
-{tangent}    if (dot(t, t) < 1e-20) t = abs(n.y) < 0.9 ? cross(vec3(0.0, 1.0, 0.0), n) : cross(vec3(1.0, 0.0, 0.0), n);
+{tangent}    if (dot(t, t) < 1e-20) {{
+        t = cross(mix(vec3(1.0, 0.0, 0.0), vec3(0.0, 1.0, 0.0), step(abs(n.y), 0.9)), n);
+    }}
     t = normalize(t);
     return mat3(t, hand * cross(n, t), n);
 }}
@@ -198,8 +229,10 @@ mat3 vt_frame_of(vec3 n, vec3 p, vec2 uv, float hand) {{
 
 _TANGENT = """\
     // Along the first texture coordinate
-    vec3 px = dFdx(p), py = dFdy(p);
-    vec2 u = dFdx(uv), v = dFdy(uv);
+    vec3 px = dFdx(p);
+    vec3 py = dFdy(p);
+    vec2 u = dFdx(uv);
+    vec2 v = dFdy(uv);
     t = (px * v.y - py * u.y) * sign(u.x * v.y - u.y * v.x);
     t -= dot(t, n) * n;
 """
@@ -213,25 +246,51 @@ vec4 vt_texel(vec2 texel) {{
     return textureLod(vt_parts, texel / vec2(textureSize(vt_parts, 0)), 0.0);
 }}
 
-vec3 vt_blur(vec4 blur, vec3 wi, vec2 plane, float side) {{
-    vec2 across = vec2(plane.x * blur.x - plane.y * blur.y, plane.y * blur.x + plane.x * blur.y) - wi.xy;
-    float up = sqrt(max(1.0 - dot(across, across), 0.0));
-    return blur.w * vt_blurred(vec3(across, side < 0.0 ? -up : up), blur.z);
+{functions}
+vec3 vt_blur(vec4 rows, vec3 place, vec3 wi, float side) {{
+    vec4 blur = vt_texel(vt_at(rows, place));
+    vec4 ray = vt_ray(blur, wi, side);
+    return blur.w * vt_blurred(ray.xyz, ray.w);
 }}
 
 // Light from wi by the environment that vt_blurred gives
 vec3 vt_environment(vec3 wi) {{
-    float sine2 = dot(wi.xy, wi.xy), column = sqrt(abs(wi.z));
-    vec2 plane = sine2 > 1e-12 ? wi.xy * inversesqrt(sine2) : vec2(1.0, 0.0);
-{azimuth}    vec3 sum = vec3(0.0);
+    vec3 place = vt_place(wi);
+    vec3 sum = vec3(0.0);
 {parts}
     return sum;
 }}
 """
 
+_PLACE = """\
+// Where parts for light from wi lie: over the cosine, over the azimuth, and whether from below
+vec3 vt_place(vec3 wi) {{
+{azimuth}    return vec3(sqrt(abs(wi.z)), azimuth, 1.0 - step(0.0, wi.z));
+}}
+"""
+
 _AZIMUTH = """\
     vec2 twice = vec2(wi.x * wi.x - wi.y * wi.y + 1e-15, 2.0 * wi.x * wi.y);
-    float along = twice.x / (abs(twice.x) + abs(twice.y)), azimuth = 0.25 * (twice.y < 0.0 ? 3.0 + along : 1.0 - along);
+    float along = twice.x / (abs(twice.x) + abs(twice.y));
+    float azimuth = 0.25 * mix(3.0 + along, 1.0 - along, step(0.0, twice.y));
+"""
+
+_AT = """\
+// The place in texels; of rows the nodes over the cosine and the azimuth, less 1, rows to that from below, the first
+vec2 vt_at(vec4 rows, vec3 place) {
+    return vec2(0.5 + rows.x * place.x, 0.5 + rows.y * place.y + rows.z * place.z + rows.w);
+}
+"""
+
+_RAY = """\
+// The direction that a blur sees, on a side of the view's, and the root of alpha
+vec4 vt_ray(vec4 blur, vec3 wi, float side) {
+    float sine2 = dot(wi.xy, wi.xy);
+    vec2 plane = mix(vec2(1.0, 0.0), wi.xy / sqrt(max(sine2, 1e-12)), step(1e-12, sine2));
+    vec2 across = vec2(plane.x * blur.x - plane.y * blur.y, plane.y * blur.x + plane.x * blur.y) - wi.xy;
+    float up = sqrt(max(1.0 - dot(across, across), 0.0));
+    return vec4(across, side * sign(wi.z) * up, blur.z);
+}
 """
 
 _UNPACKED = """\

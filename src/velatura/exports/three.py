@@ -108,6 +108,7 @@ varying vec2 vtUv;
 ${{code}}
 
 ${{frame}}
+mat3 vt_frame;
 
 #ifdef USE_ENVMAP
 mat3 vt_sky; // from the frame to the environment's

@@ -12,9 +12,10 @@ from velatura.shader.printers.c_like import SAMPLER, VALUES, CLike
 from velatura.shader.printers.printer import ATOM, Field
 from velatura.shader.recorder.symbol import LAYOUT, REMAINDER, SHOWN
 
-_TYPES = {"float": "f32", "int": "i32", "bvec3": "vec3<bool>"}
+_TYPES = {"float": "f32", "int": "i32", "bvec3": "vec3<bool>", "mat3": "mat3x3f"}
 _TYPES |= {f"{short}vec{n}": f"vec{n}{end}" for short, end in (("", "f"), ("i", "i")) for n in (2, 3, 4)}
-_WORD = re.compile(rf"\b({'|'.join(_TYPES)})\b")
+_WORDS = _TYPES | {"texelFetch": "textureLoad", "dFdx": "dpdx", "dFdy": "dpdy"}
+_WORD = re.compile(rf"\b({'|'.join(_WORDS)})\b")
 _TYPE = rf"(?:{'|'.join(_TYPES)}|bool|Vt\w+)"
 _FUNCTION = re.compile(rf"^({_TYPE}) (\w+)\((.*?)\) (?=\{{)", re.MULTILINE)
 _ARGUMENT = re.compile(rf"({_TYPE}) (\w+)")
@@ -32,8 +33,8 @@ class Wgsl(CLike):
             arguments = _ARGUMENT.sub(r"\2: \1", found[3])
             return f"fn {found[2]}({arguments}) -> {found[1]} "
 
-        text = _DECLARED.sub(r"var \1 = ", _FUNCTION.sub(function, text)).replace("texelFetch(", "textureLoad(")
-        return _WORD.sub(lambda word: _TYPES[word[1]], text)
+        text = _DECLARED.sub(r"var \1 = ", _FUNCTION.sub(function, text))
+        return _WORD.sub(lambda word: _WORDS[word[1]], text)
 
     def declared(self, kind: str, name: str, text: str = "") -> str:
         return f"let {name} = {text};" if text else f"var {name}: {self.type(kind)};"
