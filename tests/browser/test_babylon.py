@@ -58,7 +58,7 @@ def test_names_do_not_reach_the_engine_s_preprocessor(stage: in_three.Stage) -> 
 def test_the_page_of_the_manual_draws(stage: in_three.Stage) -> None:
     """Expected: the page as it is printed draws the material, with no complaint on its console."""
     manual = Path(__file__).parents[2] / "docs" / "how-to" / "in-my-engine.md"
-    _, page = re.findall(r"```html\n(.*?)```", manual.read_text(encoding="utf-8"), re.DOTALL)
+    _, _, page = re.findall(r"```html\n(.*?)```", manual.read_text(encoding="utf-8"), re.DOTALL)
     sky = in_three.radiance(in_three.softbox())
     stage.files.update(
         {"gold.js": vt.export("bare-gold", "babylon", "bati2021").text, "page.html": page, "sky.hdr": sky}

@@ -48,7 +48,7 @@ def test_the_page_of_the_manual_draws(three: in_three.Stage) -> None:
     """Expected: the page as it is printed draws the material, with no complaint on its console; its copies of three.js
     are those of the editor's page."""
     manual = Path(__file__).parents[2] / "docs" / "how-to" / "in-my-engine.md"
-    page, _ = re.findall(r"```html\n(.*?)```", manual.read_text(encoding="utf-8"), re.DOTALL)
+    page, _, _ = re.findall(r"```html\n(.*?)```", manual.read_text(encoding="utf-8"), re.DOTALL)
     three.files.update({"gold.js": vt.export("bare-gold", "three", "bati2021").text, "page.html": page})
     picture, complaints = three.visit("page.html")
     assert not complaints

@@ -97,15 +97,47 @@ DRAW_BY_WEBGPU = _SCENE % (
 )
 
 
+# Chromium presents no canvas of WebGPU without a GPU: a texture in place of each, and shown(), its address of data;
+# frames wait for the one before, as a display has them wait
+KEEP = """
+const next = window.requestAnimationFrame;
+navigator.gpu.getPreferredCanvasFormat = () => 'rgba8unorm';
+Object.assign(GPUCanvasContext.prototype, {
+  configure({ device, format }) {
+    const { width, height } = this.canvas, usage = GPUTextureUsage.RENDER_ATTACHMENT | GPUTextureUsage.COPY_SRC;
+    const texture = device.createTexture({ size: [width, height], format, usage });
+    const bytesPerRow = 256 * Math.ceil(width / 64);
+    window.requestAnimationFrame = (draw) => void device.queue.onSubmittedWorkDone().then(() => next(draw));
+    this.getCurrentTexture = () => {
+      window.shown = async () => {
+        const usage = GPUBufferUsage.COPY_DST | GPUBufferUsage.MAP_READ;
+        const buffer = device.createBuffer({ size: bytesPerRow * height, usage });
+        const encoder = device.createCommandEncoder();
+        encoder.copyTextureToBuffer({ texture }, { buffer, bytesPerRow }, [width, height]);
+        device.queue.submit([encoder.finish()]);
+        await buffer.mapAsync(GPUMapMode.READ);
+        const pixels = new Uint8ClampedArray(buffer.getMappedRange());
+        const canvas = Object.assign(document.createElement('canvas'), { width, height });
+        canvas.getContext('2d').putImageData(new ImageData(pixels, bytesPerRow / 4), 0, 0);
+        return canvas.toDataURL();
+      };
+      return texture;
+    };
+  },
+});
+"""
+
+
 @dataclass(frozen=True)
 class Engine:
     """An engine: the folder of its package, the address in place of which it is served, a page with it, and a function
-    that draws a ball there."""
+    that draws a ball there; a script that keeps what canvases show, where no screenshot has it."""
 
     folder: Path
     network: str
     page: str
     draw: str
+    keep: str = ""
 
 
 @dataclass(frozen=True)
@@ -167,13 +199,15 @@ class Stage:
         page.on("console", listen)
         page.on("pageerror", lambda error: said.append(str(error)))
         page.set_viewport_size({"width": size, "height": size})
+        page.add_init_script(self.engine.keep)
         self.serve(page)
         page.goto(ADDRESS + name)
         page.wait_for_function(ready)
         page.evaluate("() => new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(done)))")
-        picture = np.asarray(Image.open(io.BytesIO(page.screenshot())).convert("RGB"))
+        kept = page.evaluate("shown()").partition(",")[2] if self.engine.keep else ""
+        shot = base64.b64decode(kept) if kept else page.screenshot()
         page.close()
-        return picture, said
+        return np.asarray(Image.open(io.BytesIO(shot)).convert("RGB")), said
 
     def serve(self, page: Any) -> None:
         """Give a page the files, and the engine in place of the network."""
@@ -206,6 +240,7 @@ WEBGPU = Engine(
     """<!doctype html><script type="importmap">{"imports": {"three/webgpu": "/build/three.webgpu.js",
     "three/tsl": "/build/three.tsl.js"}}</script>""",
     DRAW_BY_WEBGPU,
+    KEEP,
 )
 
 

@@ -120,7 +120,7 @@ def test_facts_state_the_loss_that_the_file_states(to: str, tmp_path: Path) -> N
     assert all(number in text for number in stated)
 
 
-@pytest.mark.parametrize("to", ["three", "babylon", "godot", "unity", "unreal"])
+@pytest.mark.parametrize("to", ["three", "three-webgpu", "babylon", "godot", "unity", "unreal"])
 def test_engines_refuse_textures_in_one_line(
     to: str, run: Run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -234,7 +234,7 @@ def test_films_are_exported(to: str, run: Run, tmp_path: Path) -> None:
         assert vt.Stack.from_dict(found["material"]) == stack
         assert found["values"]["layer1_film0_eta"] == [1.4, 1.46, 1.5]
         assert found["values"]["layer0_film0_thickness_nm"] == 200
-    elif to in ("osl", "blender", "mtlx", "three", "babylon", "godot", "unity", "unreal"):
+    elif to in ("osl", "blender", "mtlx", "three", "three-webgpu", "babylon", "godot", "unity", "unreal"):
         assert "by the model velatura" in path.read_text().lower()
     elif to == "python":
         assert runpy.run_path(str(path))["stack"] == stack

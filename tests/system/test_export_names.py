@@ -41,7 +41,7 @@ CONTROL = ["\n", "\r", "a\0", "\x1b[2J", "\x7f", "\x85", "\u2028", "\u2029", "\u
 MODEL = "belcour2018"
 
 TEXTS = [name for name, each in FORMATS.items() if each.is_text]
-UNIFORM = "bsdf-xml", "three", "babylon", "godot", "unity", "unreal"  # which have no textures
+UNIFORM = "bsdf-xml", "three", "three-webgpu", "babylon", "godot", "unity", "unreal"  # which have no textures
 PAINTED = [name for name in TEXTS if name not in UNIFORM]
 
 Structure = Callable[[str], Any]

@@ -63,7 +63,7 @@ OTHERS = {
     "text": "it is output",
     "glsl": "tests/system/test_engines.py runs it",
     "js": "tests/browser/test_shader.py runs it",
-    "html": "tests/browser/test_three.py and test_babylon.py open it",
+    "html": "tests/browser/test_three.py, test_three_webgpu.py and test_babylon.py open it",
 }
 # Pages that are not run here, and the tests that run them whole
 PAGES_ELSEWHERE = {"docs/tutorials/four-steps.md": "tests/system/test_newcomer.py"}

@@ -215,8 +215,8 @@ def _string(text: str) -> str:
 
 
 _FRAME = """\
-// Columns are the tangent, the bitangent, and the normal outwards, in the engine's coordinates; of a normal, a place and
-// its texture coordinate. hand is -1 where coordinates are left-handed
+// Columns are the tangent, the bitangent, and the normal outwards, in the engine's coordinates; of a normal, a place
+// and its texture coordinate. hand is -1 where coordinates are left-handed
 mat3 vt_frame_of(vec3 n, vec3 p, vec2 uv, float hand) {{
     vec3 t = vec3(0.0);
 {tangent}    if (dot(t, t) < 1e-20) {{

@@ -17,6 +17,7 @@ const GROUPS = {
     'gltf-coat': 'glTF 2.0, with a coat',
     usd: 'USD, OpenPBR and preview',
     three: 'three.js, material',
+    'three-webgpu': 'three.js, material for WebGPU',
     babylon: 'Babylon.js, material',
     godot: 'Godot 4, material',
     unity: 'Unity, Shader Graph function',
