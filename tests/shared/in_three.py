@@ -30,6 +30,7 @@ Array = NDArray[np.floating]
 RADIUS = 0.98
 EDGE = 0.999  # of the radius: nearer to the edge, interpolated normals of a mesh are not those of the sphere
 ADDRESS = "https://engine.test/"  # pages without encryption have no WebGPU
+Rectangle = tuple[float, float, tuple[float, float, float]]  # width, height and middle; shines at the origin with 1
 
 _SCENE = """
 async (job) => {
@@ -50,6 +51,11 @@ async (job) => {
   if (job.light) {
     const light = new THREE.DirectionalLight(0xffffff, 1);
     light.position.set(...job.light);
+    scene.add(light);
+  } else if (job.rectangle) {
+    const light = new THREE.RectAreaLight(0xffffff, 1, job.rectangle[0], job.rectangle[1]);
+    light.position.set(...job.rectangle[2]);
+    light.lookAt(0, 0, 0);
     scene.add(light);
   } else scene.environment = sky;
   const complaints = [];
@@ -155,6 +161,7 @@ class Stage:
         size: int = 96,
         light: tuple[float, float, float] | None = None,
         tilt: float = 0.0,
+        rectangle: Rectangle | None = None,
     ) -> Array:
         """A ball, linear colours and coverage (size, size, 4), from the top.
 
@@ -162,6 +169,7 @@ class Stage:
             module: text of an export.
             sky: environment (height, width, 3), from the top, y up, in the engine's coordinates.
             light: direction of a light in place of the environment.
+            rectangle: a light in place of the environment.
         """
         name = f"{len(self.files)}.js"
         self.files.update({name: module, "sky.hdr": radiance(sky)})
@@ -177,6 +185,7 @@ class Stage:
                 "radius": RADIUS,
                 "light": light,
                 "tilt": tilt,
+                "rectangle": rectangle,
             },
         )
         assert not found["complaints"], "\n".join(filter(None, found["complaints"]))
@@ -275,6 +284,29 @@ def by_the_model(material: MaterialLike, light: Array, pixels: Sequence[tuple[in
     frames = [frame_at(row, column, size) for row, column in pixels]
     values = (body.eval_pdf(tuple(frame[:, 2, None]), tuple((frame @ light)[:, None]))[0] for frame in frames)
     return np.array([np.ravel(value) for value in values])
+
+
+def by_rectangle(
+    material: MaterialLike, rectangle: Rectangle, pixels: Sequence[tuple[int, int]], size: int, count: int = 128
+) -> Array:
+    """Light of the model (pixels, 3) at rows and columns of the ball, by `count` squared points of a rectangle."""
+    body = SideBySide.of([(1, Material.of(vt.load(material)))], named("velatura"))
+    width, height, middle = rectangle
+    n = -np.array(middle) / np.linalg.norm(middle)
+    u = np.cross([0, 1, 0], n)
+    u /= np.linalg.norm(u)
+    at = (np.arange(count) + 0.5) / count - 0.5
+    points = middle + width * at[:, None, None] * u + height * at[:, None] * np.cross(n, u)
+    found = []
+    for row, column in pixels:
+        frame = frame_at(row, column, size)
+        way = points.reshape(-1, 3) - RADIUS * frame[2]
+        distance = np.linalg.norm(way, axis=1)
+        wo = way / distance[:, None]
+        solid = np.maximum(-wo @ n, 0) / distance**2 * width * height / count**2
+        value = body.eval_pdf(tuple(frame[:, 2, None]), tuple(frame @ wo.T))[0]
+        found.append((np.broadcast_to(value, (3, len(way))) * solid).sum(axis=1))
+    return np.array(found)
 
 
 def radiance(sky: Array) -> bytes:

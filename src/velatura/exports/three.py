@@ -30,8 +30,8 @@ _MODULE = """\
 //     mesh.material = new LayeredMaterial();
 //
 // It meets the lights, shadows and fog of a scene, and scene.environment or its own envMap. Brushed layers follow the
-// texture coordinates. Light that passes comes from the environment behind, not from other objects; area lights and
-// light maps are not met. For WebGLRenderer.
+// texture coordinates. Light that passes comes from the environment behind, not from other objects; light maps are not
+// met. For WebGLRenderer.
 
 import {{
   DataTexture, DoubleSide, Euler, FrontSide, HalfFloatType, LinearFilter, RGBAFormat, ShaderLib, ShaderMaterial,
@@ -51,6 +51,50 @@ const frame = `
 /** What it makes of an environment, by vt_blurred(direction, root of alpha). */
 const environment = `
 {environment}
+`;
+
+/** Light of rectangles. */
+const rectangles = `
+// What the edge between two directions adds to the light of a polygon that shines with 2 pi (Lambert's formula)
+float vt_edge(vec3 a, vec3 b) {{
+    vec3 n = cross(normalize(a), normalize(b));
+    float sine = length(n);
+    return sine > 1e-6 ? n.z * atan(sine, dot(normalize(a), normalize(b))) / sine : n.z;
+}}
+
+// Share of the light of all directions, weighed by their cosines, that is that of a rectangle in part below the horizon
+float vt_seen(vec3 corners[4]) {{
+    float sum = 0.0;
+    vec3 sets = vec3(0.0), rises = vec3(0.0);
+    for (int i = 0; i < 4; i++) {{
+        vec3 a = corners[i], b = corners[(i + 1) % 4];
+        if (a.z <= 0.0 && b.z <= 0.0) continue;
+        vec3 cut = mix(a, b, a.z / (a.z - b.z));
+        if (a.z <= 0.0) a = rises = cut;
+        if (b.z <= 0.0) b = sets = cut;
+        sum += vt_edge(a, b);
+    }}
+    if (sets != rises) sum += vt_edge(sets, rises);
+    return max(sum / 6.2831853, 0.0);
+}}
+
+// The lobe of GGX whose normal, view and mirror direction agree, nearly as a linearly transformed cosine (Heitz, Dupuy,
+// Hill and Neubelt, doi.org/10.1145/2897824.2925895); w and p are in the camera's coordinates
+vec3 vt_rectangles(vec3 w, vec3 p, float roughness) {{
+    float alpha = max(roughness * roughness, 1e-3), stretch = 2.0 * alpha / (1.0 + pow(alpha, 1.25));
+    vec3 t = normalize(abs(w.y) < 0.9 ? cross(vec3(0.0, 1.0, 0.0), w) : cross(vec3(1.0, 0.0, 0.0), w));
+    mat3 to_cosine = transpose(mat3(t, cross(w, t), stretch * w));
+    vec3 light = vec3(0.0);
+    for (int i = 0; i < NUM_RECT_AREA_LIGHTS; i++) {{
+        vec3 middle = rectAreaLights[i].position - p;
+        vec3 u = rectAreaLights[i].halfWidth, v = rectAreaLights[i].halfHeight;
+        if (dot(cross(u, v), middle) <= 0.0) continue; // seen from behind
+        vec3 corners[4] = vec3[4](middle + u + v, middle - u + v, middle - u - v, middle + u - v);
+        for (int k = 0; k < 4; k++) corners[k] = to_cosine * corners[k];
+        light += rectAreaLights[i].color * vt_seen(corners);
+    }}
+    return light;
+}}
 `;
 
 const vertexShader = `
@@ -113,7 +157,7 @@ mat3 vt_frame;
 #ifdef USE_ENVMAP
 mat3 vt_sky; // from the frame to the environment's
 
-vec3 vt_blurred(vec3 w, float roughness) {{
+vec3 vt_sky_blurred(vec3 w, float roughness) {{
     #ifdef ENVMAP_TYPE_PMREM
     float level = floor(8.0 * roughnessToMip(roughness) + 0.5) / 8.0; // that neighbours mostly share
     return envMapIntensity * textureLod(envMap, vt_sky * w, level).rgb;
@@ -121,6 +165,23 @@ vec3 vt_blurred(vec3 w, float roughness) {{
     vec3 seen = vt_frame * w; // before r187
     return getIBLRadiance(seen, seen, roughness);
     #endif
+}}
+#endif
+
+#if NUM_RECT_AREA_LIGHTS > 0
+${{rectangles}}
+#endif
+
+#if defined(USE_ENVMAP) || NUM_RECT_AREA_LIGHTS > 0
+vec3 vt_blurred(vec3 w, float roughness) {{
+    vec3 light = vec3(0.0);
+    #ifdef USE_ENVMAP
+    light += vt_sky_blurred(w, roughness);
+    #endif
+    #if NUM_RECT_AREA_LIGHTS > 0
+    light += vt_rectangles(vt_frame * w, -vViewPosition, roughness);
+    #endif
+    return light;
 }}
 
 ${{environment}}
@@ -162,6 +223,8 @@ void main() {{
     vec3 light = reflectedLight.directSpecular;
     #ifdef USE_ENVMAP
     vt_sky = envMapRotation * transpose(mat3(viewMatrix)) * vt_frame;
+    #endif
+    #if defined(USE_ENVMAP) || NUM_RECT_AREA_LIGHTS > 0
     light += vt_environment(material.wi);
     #endif
     gl_FragColor = vec4(light, 1.0);
