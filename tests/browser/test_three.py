@@ -39,18 +39,11 @@ def test_lights_meet_the_model_itself(three: in_three.Stage) -> None:
 MATT = vt.Stack([vt.Diffuse(albedo=0.8)])
 
 
-@pytest.mark.parametrize(("material", "most"), [(MATT, 0.01), ("glossy-plastic", 0.03), ("varnished-paint", 0.03)])
+@pytest.mark.parametrize(("material", "most"), [(MATT, 0.01), ("varnished-paint", 0.01), ("coated-gold", 0.05)])
 def test_area_lights_meet_the_model(three: in_three.Stage, material: vt.Stack | str, most: float) -> None:
-    """Expected: sums over 128 x 128 points of the light, within .03 of white as displays have it."""
-    lamp = (2.0, 1.2, (1.5, 1.2, 1.8))
-    found = three.ball(vt.export(material, "three").text, in_three.softbox(), SIZE, rectangle=lamp)
-    middle = (SIZE - 1) / 2
-    places = [(row, column) for row in range(1, SIZE, 2) for column in range(1, SIZE, 2)]
-    pixels = [place for place in places if np.hypot(*np.subtract(place, middle)) < 0.95 * in_three.RADIUS * SIZE / 2]
-    seen = np.array([found[place] for place in pixels])
-    expected = np.pad(in_three.by_rectangle(material, lamp, pixels, SIZE), ((0, 0), (0, 1)), constant_values=1)
-    assert len(pixels) > 90
-    assert in_three.matched(expected, seen) < most
+    """Expected: sums over 128 x 128 points of the light, within .01 of white as displays have it, .05 where layers are
+    brushed."""
+    assert in_three.missed(three, material, "three") < most
 
 
 def test_mixtures_are_sums_of_their_parts(three: in_three.Stage) -> None:

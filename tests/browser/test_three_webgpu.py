@@ -52,6 +52,12 @@ def test_lights_meet_the_model_itself(stage: in_three.Stage, preset: str, light:
     np.testing.assert_allclose([found[row, column, :3] for row, column in PIXELS], expected, rtol=0.05, atol=1e-3)
 
 
+@pytest.mark.parametrize("material", [vt.Stack([vt.Diffuse(albedo=0.8)]), "glossy-plastic"])
+def test_area_lights_meet_the_model(stage: in_three.Stage, material: vt.Stack | str) -> None:
+    """Expected: sums over 128 x 128 points of the light, within .01 of white as displays have it."""
+    assert in_three.missed(stage, material, "three-webgpu") < 0.01
+
+
 def test_names_do_not_change_the_code(stage: in_three.Stage) -> None:
     """Expected: the light of the same stack without a name."""
     light, layers = (0.0, 0.0, 1.0), [vt.Diffuse(albedo=0.8)]

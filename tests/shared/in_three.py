@@ -31,6 +31,7 @@ RADIUS = 0.98
 EDGE = 0.999  # of the radius: nearer to the edge, interpolated normals of a mesh are not those of the sphere
 ADDRESS = "https://engine.test/"  # pages without encryption have no WebGPU
 Rectangle = tuple[float, float, tuple[float, float, float]]  # width, height and middle; shines at the origin with 1
+LAMP: Rectangle = (2.0, 1.2, (1.5, 1.2, 1.8))
 
 _SCENE = """
 async (job) => {
@@ -54,6 +55,10 @@ async (job) => {
     scene.add(light);
   } else if (job.rectangle) {
     const light = new THREE.RectAreaLight(0xffffff, 1, job.rectangle[0], job.rectangle[1]);
+    if (THREE.RectAreaLightNode) {
+      const { RectAreaLightTexturesLib } = await import('/examples/jsm/lights/RectAreaLightTexturesLib.js');
+      THREE.RectAreaLightNode.setLTC(RectAreaLightTexturesLib.init());
+    }
     light.position.set(...job.rectangle[2]);
     light.lookAt(0, 0, 0);
     scene.add(light);
@@ -246,8 +251,8 @@ THREE = Engine(
 WEBGPU = Engine(
     THREE.folder,
     THREE.network,
-    """<!doctype html><script type="importmap">{"imports": {"three/webgpu": "/build/three.webgpu.js",
-    "three/tsl": "/build/three.tsl.js"}}</script>""",
+    """<!doctype html><script type="importmap">{"imports": {"three": "/build/three.webgpu.js",
+    "three/webgpu": "/build/three.webgpu.js", "three/tsl": "/build/three.tsl.js"}}</script>""",
     DRAW_BY_WEBGPU,
     KEEP,
 )
@@ -307,6 +312,15 @@ def by_rectangle(
         value = body.eval_pdf(tuple(frame[:, 2, None]), tuple(frame @ wo.T))[0]
         found.append((np.broadcast_to(value, (3, len(way))) * solid).sum(axis=1))
     return np.array(found)
+
+
+def missed(stage: Stage, material: MaterialLike, to: str, size: int = 24) -> float:
+    """How far a ball under `LAMP`, by a module of a format, is from the model, as `matched` has it."""
+    found = stage.ball(vt.export(material, to).text, softbox(), size, rectangle=LAMP)
+    places = [(row, column) for row in range(1, size, 2) for column in range(1, size, 2)]
+    pixels = [place for place in places if np.hypot(*np.subtract(place, (size - 1) / 2)) < 0.95 * RADIUS * size / 2]
+    expected = np.pad(by_rectangle(material, LAMP, pixels, size), ((0, 0), (0, 1)), constant_values=1)
+    return matched(expected, np.array([found[place] for place in pixels]))
 
 
 def radiance(sky: Array) -> bytes:

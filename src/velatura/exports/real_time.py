@@ -293,6 +293,47 @@ vec4 vt_ray(vec4 blur, vec3 wi, float side) {
 }
 """
 
+#: Functions by name, in GLSL, each of which calls those before it: how much a rectangle lights a blur.
+RECTANGLE = {
+    "vt_edge": """\
+// What the edge between two directions adds to the light of a polygon that shines with 2 pi (Lambert's formula)
+float vt_edge(vec3 a, vec3 b) {
+    vec3 n = cross(a, b);
+    float sine = length(n);
+    float angle = acos(clamp(dot(a, b), -1.0, 1.0));
+    return n.z * mix(1.0, angle / max(sine, 1e-6), step(0.02, sine));
+}
+""",
+    "vt_edge_above": """\
+// The same, where what lies below the horizon is brought up to it
+float vt_edge_above(vec3 a, vec3 b) {
+    vec3 cut = mix(a, b, clamp(a.z / (a.z - b.z + 1e-20), 0.0, 1.0));
+    vec3 up = vec3(1.0, 1.0, 0.0);
+    vec3 first = normalize(max(a, a * up));
+    vec3 last = normalize(max(b, b * up));
+    vec3 between = normalize(max(cut, cut * up));
+    return vt_edge(first, between) + vt_edge(between, last);
+}
+""",
+    "vt_rectangle": """\
+// The share that a rectangle has of the lobe of GGX whose normal, view and mirror direction w agree, nearly that of a
+// linearly transformed cosine (Heitz, Dupuy, Hill and Neubelt, doi.org/10.1145/2897824.2925895). It shines to the side
+// of -cross(u, v), by halves of its sides
+float vt_rectangle(vec3 w, vec3 middle, vec3 u, vec3 v, float roughness) {
+    float alpha = max(roughness * roughness, 1e-3);
+    float stretch = 2.0 * alpha / (1.0 + pow(alpha, 1.25));
+    vec3 t = normalize(cross(mix(vec3(1.0, 0.0, 0.0), vec3(0.0, 1.0, 0.0), step(abs(w.y), 0.9)), w));
+    mat3 to_cosine = transpose(mat3(t, cross(w, t), stretch * w));
+    vec3 a = to_cosine * (middle + u + v);
+    vec3 b = to_cosine * (middle - u + v);
+    vec3 c = to_cosine * (middle - u - v);
+    vec3 d = to_cosine * (middle + u - v);
+    float sum = vt_edge_above(a, b) + vt_edge_above(b, c) + vt_edge_above(c, d) + vt_edge_above(d, a);
+    return step(0.0, dot(cross(u, v), middle)) * max(sum, 0.0) / 6.2831853;
+}
+""",
+}
+
 _UNPACKED = """\
 /** The textures of the module: names with width, height and halves of floats. */
 function unpacked() {

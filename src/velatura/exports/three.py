@@ -19,7 +19,8 @@ def write(request: Request) -> Export:
     """
     made, around = real_time.lit(request, Glsl(half=True)), real_time.environment(request)
     sided = "DoubleSide" if made.two_sided else "FrontSide"
-    return real_time.module(_MODULE, request, made, around, "LayeredMaterial", sided=sided)
+    rectangle = "\n".join(real_time.RECTANGLE.values())
+    return real_time.module(_MODULE, request, made, around, "LayeredMaterial", sided=sided, rectangle=rectangle)
 
 
 _MODULE = """\
@@ -53,45 +54,14 @@ const environment = `
 {environment}
 `;
 
-/** Light of rectangles. */
+/** Light of rectangles in place of an environment's. */
 const rectangles = `
-// What the edge between two directions adds to the light of a polygon that shines with 2 pi (Lambert's formula)
-float vt_edge(vec3 a, vec3 b) {{
-    vec3 n = cross(normalize(a), normalize(b));
-    float sine = length(n);
-    return sine > 1e-6 ? n.z * atan(sine, dot(normalize(a), normalize(b))) / sine : n.z;
-}}
-
-// Share of the light of all directions, weighed by their cosines, that is that of a rectangle in part below the horizon
-float vt_seen(vec3 corners[4]) {{
-    float sum = 0.0;
-    vec3 sets = vec3(0.0), rises = vec3(0.0);
-    for (int i = 0; i < 4; i++) {{
-        vec3 a = corners[i], b = corners[(i + 1) % 4];
-        if (a.z <= 0.0 && b.z <= 0.0) continue;
-        vec3 cut = mix(a, b, a.z / (a.z - b.z));
-        if (a.z <= 0.0) a = rises = cut;
-        if (b.z <= 0.0) b = sets = cut;
-        sum += vt_edge(a, b);
-    }}
-    if (sets != rises) sum += vt_edge(sets, rises);
-    return max(sum / 6.2831853, 0.0);
-}}
-
-// The lobe of GGX whose normal, view and mirror direction agree, nearly as a linearly transformed cosine (Heitz, Dupuy,
-// Hill and Neubelt, doi.org/10.1145/2897824.2925895); w and p are in the camera's coordinates
+{rectangle}
 vec3 vt_rectangles(vec3 w, vec3 p, float roughness) {{
-    float alpha = max(roughness * roughness, 1e-3), stretch = 2.0 * alpha / (1.0 + pow(alpha, 1.25));
-    vec3 t = normalize(abs(w.y) < 0.9 ? cross(vec3(0.0, 1.0, 0.0), w) : cross(vec3(1.0, 0.0, 0.0), w));
-    mat3 to_cosine = transpose(mat3(t, cross(w, t), stretch * w));
     vec3 light = vec3(0.0);
     for (int i = 0; i < NUM_RECT_AREA_LIGHTS; i++) {{
-        vec3 middle = rectAreaLights[i].position - p;
-        vec3 u = rectAreaLights[i].halfWidth, v = rectAreaLights[i].halfHeight;
-        if (dot(cross(u, v), middle) <= 0.0) continue; // seen from behind
-        vec3 corners[4] = vec3[4](middle + u + v, middle - u + v, middle - u - v, middle + u - v);
-        for (int k = 0; k < 4; k++) corners[k] = to_cosine * corners[k];
-        light += rectAreaLights[i].color * vt_seen(corners);
+        RectAreaLight each = rectAreaLights[i];
+        light += each.color * vt_rectangle(w, each.position - p, each.halfWidth, each.halfHeight, roughness);
     }}
     return light;
 }}

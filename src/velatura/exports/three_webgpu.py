@@ -45,6 +45,7 @@ def write(request: Request) -> Export:
         handed=f"{texture}, " if texture else "",
         given=f"{texture}: textures.{texture}, " if texture else "",
         parts="".join(f"  {json.dumps(part)},\n" for part in around.parts),
+        rectangle=printer.spelled("\n".join(real_time.RECTANGLE.values())),
     )
 
 
@@ -56,8 +57,8 @@ _MODULE = """\
 //     mesh.material = new LayeredMaterial();
 //
 // It meets the lights, shadows and fog of a scene, and scene.environment or its own envMap or envNode. Brushed layers
-// follow the texture coordinates. Light that passes comes from the environment behind, not from other objects; area
-// lights and light maps are not met. For WebGPURenderer, where it has WebGPU.
+// follow the texture coordinates. Light that passes comes from the environment behind, not from other objects; light
+// maps are not met. For WebGPURenderer, where it has WebGPU.
 
 import {{
   DataTexture, DoubleSide, Euler, FrontSide, HalfFloatType, LightingModel, LightingNode, LinearFilter, NodeMaterial,
@@ -80,7 +81,18 @@ const vt_frame_of = `
 
 /** Where parts of the material see an environment. */
 {functions}
+/** How much a rectangle lights a blur, in place of an environment. */
+const vt_rectangle = `
+{rectangle}
+`;
+
 const model = wgsl(code);
+const rectangleOf = wgslFn(
+  `fn vt_share(w: vec3f, middle: vec3f, u: vec3f, v: vec3f, roughness: f32) -> f32 {{
+    return vt_rectangle(w, middle, u, v, roughness);
+  }}`,
+  [wgsl(vt_rectangle)],
+);
 const frameOf = wgslFn(vt_frame_of), placeOf = wgslFn(vt_place), at = wgslFn(vt_at), rayOf = wgslFn(vt_ray);
 const lobesOf = wgslFn(
   `fn vt_lobes_at({declared}uv: vec2f, wi: vec3f) -> VtLobes {{
@@ -94,6 +106,26 @@ const valueOf = wgslFn(
   }}`,
   [model],
 );
+
+/** The parts: their share, the side that they leave on, and rows of texels, of the energy and of blurs. */
+const parts = [
+{parts}];
+
+/** The sum of the parts, by the light that each blur sees: a node of its ray, whose last component is a roughness. */
+function seen(wi, blurred) {{
+  const place = placeOf({{ wi }}).toVar(), sum = vec3(0).toVar();
+  const {{ width, height }} = textures.vt_parts.value.image, size = vec2(width, height);
+  const texel = (rows) => textures.vt_parts.sample(at({{ rows: vec4(...rows), place }}).div(size)).level(0);
+  for (const [share, side, energy, blurs] of parts) {{
+    const light = vec3(0).toVar();
+    for (const rows of blurs) {{
+      const blur = texel(rows).toVar(), ray = rayOf({{ blur, wi, side: float(side) }}).toVar();
+      light.addAssign(blurred(ray).mul(blur.w));
+    }}
+    sum.addAssign(texel(energy).rgb.mul(light, share));
+  }}
+  return sum;
+}}
 
 /** Lights by the model; directions are in the frame of the surface. */
 class Layers extends LightingModel {{
@@ -119,14 +151,16 @@ class Layers extends LightingModel {{
     reflectedLight.directSpecular.addAssign(lightColor.mul(value));
   }}
 
+  directRectArea({{ lightColor, lightPosition, halfWidth, halfHeight, reflectedLight }}) {{
+    const rectangle = {{ middle: lightPosition.sub(positionView), u: halfWidth, v: halfHeight }};
+    const light = seen(this.wi, (ray) => rectangleOf({{ w: this.frame.mul(ray.xyz), roughness: ray.w, ...rectangle }}));
+    reflectedLight.directSpecular.addAssign(lightColor.mul(light));
+  }}
+
   indirect({{ context }}) {{
     context.reflectedLight.indirectSpecular.addAssign(context.radiance);
   }}
 }}
-
-/** The parts: their share, the side that they leave on, and rows of texels, of the energy and of blurs. */
-const parts = [
-{parts}];
 
 /** Light by an environment, by nodes of which others ask a direction and a roughness. */
 class Surroundings extends LightingNode {{
@@ -136,19 +170,13 @@ class Surroundings extends LightingNode {{
   }}
 
   setup({{ context }}) {{
-    const {{ frame, wi }} = context.lightingModel, place = placeOf({{ wi }}).toVar();
-    const {{ width, height }} = textures.vt_parts.value.image, size = vec2(width, height);
-    const texel = (rows) => textures.vt_parts.sample(at({{ rows: vec4(...rows), place }}).div(size)).level(0);
-    for (const [share, side, energy, blurs] of parts) {{
-      const light = vec3(0).toVar();
-      for (const rows of blurs) {{
-        const blur = texel(rows).toVar(), ray = rayOf({{ blur, wi, side: float(side) }}).toVar();
-        const direction = frame.mul(ray.xyz).transformDirection(cameraWorldMatrix).toVar();
-        const seen = this.sky.context({{ getUV: () => direction, getTextureLevel: () => ray.w }});
-        light.addAssign(isolate(seen).mul(blur.w)); // or the engine would take it for that of the last blur
-      }}
-      context.radiance.addAssign(texel(energy).rgb.mul(light, materialEnvIntensity, share));
-    }}
+    const {{ frame, wi }} = context.lightingModel;
+    const light = seen(wi, (ray) => {{
+      const direction = frame.mul(ray.xyz).transformDirection(cameraWorldMatrix).toVar();
+      const found = this.sky.context({{ getUV: () => direction, getTextureLevel: () => ray.w }});
+      return isolate(found); // or the engine would take it for that of the last blur
+    }});
+    context.radiance.addAssign(light.mul(materialEnvIntensity));
   }}
 }}
 
