@@ -15,7 +15,7 @@ const GROUPS = {
     openpbr: 'OpenPBR, MaterialX',
     gltf: 'glTF 2.0',
     'gltf-coat': 'glTF 2.0, with a coat',
-    usd: 'USD, OpenPBR and preview',
+    usd: 'USD, OpenPBR, lobes and preview',
     three: 'three.js, material',
     'three-webgpu': 'three.js, material for WebGPU',
     babylon: 'Babylon.js, material',
