@@ -18,7 +18,7 @@ from velatura.scenes import scene_dict, tone_map
 
 mi.set_variant("llvm_ad_rgb")
 vt.register()
-SIZE, SPP = 96, 16
+SIZE, SPP = 96, 8
 milky = vt.Stack(
     [
         vt.Interface(eta=1.5, alpha=0.1),
@@ -46,7 +46,7 @@ def seconds(bsdf):
 
 
 # %%
-# The time of the exact form at 16 samples decides how many samples the others have. The truth is the exact form by
+# The time of the exact form at 8 samples decides how many samples the others have. The truth is the exact form by
 # another seed and 32 times the samples.
 
 cost = {name: seconds(bsdf) for name, bsdf in bsdfs.items()}
