@@ -8,6 +8,7 @@ import stat
 import threading
 from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
+from contextlib import contextmanager
 from pathlib import Path
 
 import pytest
@@ -22,13 +23,15 @@ def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     return tmp_path
 
 
-@pytest.fixture
-def small_files() -> Iterator[None]:
-    """No file may grow beyond 8 KiB, which a write meets as it meets a full disk."""
+@contextmanager
+def small_files(most: int = 8192) -> Iterator[None]:
+    """No file may grow beyond so many bytes, which a write meets as it meets a full disk; a report of tests may."""
     before = resource.getrlimit(resource.RLIMIT_FSIZE)
-    resource.setrlimit(resource.RLIMIT_FSIZE, (8192, before[1]))
-    yield
-    resource.setrlimit(resource.RLIMIT_FSIZE, before)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (most, before[1]))
+    try:
+        yield
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, before)
 
 
 def write(path: str | Path, text: str = "new") -> None:
@@ -131,17 +134,17 @@ def test_the_longest_name_is_no_hindrance() -> None:
     assert os.listdir() == [name]
 
 
-def test_a_full_disk_loses_nothing(small_files: None) -> None:
+def test_a_full_disk_loses_nothing() -> None:
     Path("a.txt").write_text("old")
-    with pytest.raises(InvalidInput) as refused:
+    with small_files(), pytest.raises(InvalidInput) as refused:
         write("a.txt", "new" * 8192)
     assert str(refused.value) == "a.txt: cannot be written: file too large"
     assert os.listdir() == ["a.txt"] and Path("a.txt").read_text() == "old"
 
 
-def test_a_disk_that_is_full_already_is_found_before_the_work(small_files: None) -> None:
-    resource.setrlimit(resource.RLIMIT_FSIZE, (0, resource.getrlimit(resource.RLIMIT_FSIZE)[1]))
-    with pytest.raises(InvalidInput, match=r"^a\.txt: the folder \. is not writable \(file too large\)$"):
+def test_a_disk_that_is_full_already_is_found_before_the_work() -> None:
+    full = r"^a\.txt: the folder \. is not writable \(file too large\)$"
+    with small_files(0), pytest.raises(InvalidInput, match=full):
         files.check_writable("a.txt", "a text", [".txt"])
     assert not os.listdir()
 
