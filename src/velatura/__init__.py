@@ -6,13 +6,15 @@ Importing this package imports no renderer and sets no variant; other modules ar
 from __future__ import annotations
 
 from importlib import import_module
-from typing import TYPE_CHECKING, Any
 
 from velatura.programs import FORMATS
 from velatura.readers import READERS
 from velatura.version import __version__ as __version__
 
+TYPE_CHECKING = False  # in place of that of `typing`, which takes half of the time of this import
 if TYPE_CHECKING:
+    from typing import Any
+
     from velatura import bakes as bakes
     from velatura import benchmark as benchmark
     from velatura import checks as checks

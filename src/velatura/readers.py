@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from typing import Any
+TYPE_CHECKING = False  # without `typing`, since the package imports this
+if TYPE_CHECKING:
+    from collections.abc import Callable
+    from typing import Any
 
 #: By the ending of the file: the function that gives the stack in FILE or FILE#NAME.
 READERS: dict[str, Callable[[str], Any]] = {}

@@ -78,7 +78,7 @@ RENDERER = {
 
 # Modules -> what importing them must not load.
 LOADS_NO = {
-    "velatura": "mitsuba drjit numpy pydantic",
+    "velatura": "mitsuba drjit numpy pydantic typing",
     "velatura.cli": "mitsuba drjit numpy pydantic scipy matplotlib yaml rich",
     "velatura.stack": "mitsuba drjit",
     "velatura.optics": "mitsuba drjit",

@@ -3,17 +3,19 @@
 from __future__ import annotations
 
 from importlib import import_module
-from typing import TYPE_CHECKING, Any, NamedTuple
 
+TYPE_CHECKING = False  # without `typing`, since the package imports this
 if TYPE_CHECKING:
+    from typing import Any
+
     from velatura.programs.program import Program
 
 
-class Baked(NamedTuple):
+class Baked:
     """A program that parameters are fitted for: the module with its `PROGRAM`, and endings of its files."""
 
-    module: str
-    endings: tuple[str, ...]
+    def __init__(self, module: str, endings: tuple[str, ...]) -> None:
+        self.module, self.endings = module, endings
 
     def program(self) -> Program:
         """The program itself."""
