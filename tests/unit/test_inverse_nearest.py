@@ -14,6 +14,7 @@ from velatura.inverse.lobes.interface import CONDUCTOR_MAX
 from velatura.inverse.local.dragged import DraggedStack, seen
 from velatura.inverse.nearest import Nearest, nearest
 from velatura.model import Model, named
+from velatura.model.variance import Roughness
 from velatura.optics import fresnel
 from velatura.stack import Stack
 
@@ -176,6 +177,25 @@ def test_a_bound_is_the_same_under_the_hand_and_at_rest() -> None:
     brightest = fresnel.normal_incidence(np.divide(metal.eta, coat.eta), np.divide(metal.k, coat.eta)).max()
     assert brightest == pytest.approx(CONDUCTOR_MAX, abs=1e-6)
     assert np.array(rest.reached.lobes[1].colour) == pytest.approx(now.lobes[1].colour, abs=2e-3)
+
+
+def test_a_metal_that_is_blurred_more_gives_up_energy_at_rest_as_under_the_hand() -> None:
+    """By the default model, a green metal that nothing covers, wished very rough; at rest, several bounds meet.
+
+    Expected: both ways the wished blur, less energy, and the same lobe and reason.
+    """
+    model = named("velatura")
+    metal = Stack([vt.Interface(eta=(2.038, 3.434, 1.288), k=(3.311, 5.821, 1.870), alpha=0.13)])
+    now = seen(metal, Target([{"energy": 0.1, "base": "conductor"}]), model)
+    hand, rest = (
+        answer(metal, now.with_roughness(0, Roughness(0.9, 0.9, 0.0)), model, quick) for quick in (True, False)
+    )
+    assert (hand.part, hand.reason) == (rest.part, rest.reason) == (1.0, "bright")
+    for found in (hand, rest):
+        (lobe,) = found.reached.lobes
+        assert lobe.roughness == pytest.approx(0.9, abs=1e-3)
+        assert np.all(np.array(lobe.colour) < now.lobes[0].colour)
+        assert lobe.colour == pytest.approx(now.lobes[0].colour, rel=0.05)
 
 
 def test_a_wish_far_beyond_what_is_possible_is_approached_by_a_part_of_it() -> None:

@@ -89,7 +89,7 @@ def nearest(present: DraggedStack, wish: Target, now: Target | None = None, quic
     if bound is not None and (not present.space.slow or not (settled or part >= LEAST)):
         found, bound, part = _further(present, now, possible, found, bound, part, quick)
     if bound is not None and (dimmer := _dimmed(present, now, possible, bound, quick)) is not None:
-        found, part = dimmer, 1.0
+        found, bound, part = dimmer, dataclasses.replace(bound, reason="bright"), 1.0
     if bound is None and not quick and _beside(found, possible) > EXACT:
         found = _met(found, possible) or found
     if part < LEAST:
@@ -118,7 +118,9 @@ def _dimmed(present: DraggedStack, now: Target, wish: Target, bound: Bound, quic
     k = bound.lobe
     lobe, before = wish.lobes[k], now.lobes[k]
     dimmed = np.abs(np.subtract(lobe.colour, before.colour)).max() > ROUNDED
-    if _named(bound, wish) != "bright" or dimmed or lobe.roughness <= before.roughness + SAME:
+    # Where a metal cannot be brighter, several bounds may meet, and none be named
+    metal = ("bright", "unmet blur") if lobe.base == "conductor" else ("bright",)
+    if _named(bound, wish) not in metal or dimmed or lobe.roughness <= before.roughness + SAME:
         return None
     dim, stopped, *_ = _along(present, now, wish.with_energy(k, DIMMED * np.array(lobe.colour)), quick)
     if stopped is not None:
