@@ -49,6 +49,7 @@ STACKS: dict[str, vt.Stack | vt.Mix] = {
         [(0.3, vt.Stack([vt.Diffuse(albedo=0.8)])), (None, vt.Stack([vt.Interface(eta=1.5, k=3, alpha=0.3)]))]
     ),
     "glass": vt.Stack([vt.Interface(eta=1.5, alpha=0.2)]),
+    "fog": vt.Stack([vt.Medium(depth=1.0, sigma_s=(1.5, 1.2, 0.9), g=0.4), vt.Diffuse(albedo=(0.2, 0.5, 0.3))]),
 }
 
 
@@ -117,7 +118,7 @@ def test_the_function_for_unity_is_the_model(name: str, hand: float) -> None:
     agree(on_machine(made.text, given, frames(ROWS, hand), wi, wo, {bound["name"]: texels}), by_the_model(name, wi, wo))
 
 
-@pytest.mark.parametrize("name", ["coated", "brushed", "mixed"])
+@pytest.mark.parametrize("name", ["coated", "brushed", "mixed", "fog"])
 def test_the_function_for_unreal_is_the_model(name: str, tmp_path: Path) -> None:
     """Expected: its values, in the engine's left-handed frames, by the texture beside it as Mitsuba reads it."""
     _, *beside = exported(name, "unreal").save(tmp_path / "a.py")

@@ -11,6 +11,7 @@ import json
 import re
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
@@ -27,6 +28,8 @@ from velatura.shader.printers.c_like import CLike
 from velatura.shader.program import PREFIX, described
 from velatura.shader.recorder import recording
 from velatura.stack import Material, Varying
+
+_DEFINED = re.compile(r"^\w+ (\w+)\(", re.MULTILINE)  # a function, whose definition begins a line
 
 
 class Row(NamedTuple):
@@ -78,6 +81,32 @@ class Lit:
     frame: str
     textures: Mapping[str, np.ndarray]
     two_sided: bool
+
+    @property
+    def texture(self) -> str:
+        """The name of its texture, if it has one, which is the only one."""
+        return next(iter(self.textures), "")
+
+    @cached_property
+    def _readers(self) -> list[str]:
+        """The names of functions of the code that read the texture, or call one that does."""
+        code, readers = _without_comments(self.code), [self.texture]
+        starts = list(_DEFINED.finditer(code))
+        for start, end in zip(starts, [*(each.start() for each in starts[1:]), len(code)]):
+            if re.search(rf"\b(?:{'|'.join(readers)})\b", code[start.end() : end]):
+                readers.append(start[1])
+        return readers[1:]
+
+    def handed(self, text: str, argument: str) -> str:
+        """The code, or calls of its functions, where these are given the texture, if there is one, which their
+        definitions declare as an argument."""
+        if not self.texture:
+            return text
+
+        def given(found: re.Match[str]) -> str:
+            return f"{found[1] or ''}{found[2]}({argument if found[1] else self.texture}, "
+
+        return re.sub(rf"(^\w+ )?\b({'|'.join(self._readers)})\(", given, text, flags=re.MULTILINE)
 
     @property
     def bare(self) -> Lit:
@@ -159,19 +188,6 @@ def _without_comments(code: str) -> str:
 def halves(texels: np.ndarray) -> str:
     """A texture as halves of floats, in base64."""
     return base64.b64encode(np.ascontiguousarray(texels, "<f2").tobytes()).decode()
-
-
-# Functions that look a texture up, where they are defined, at the begin of a line, and where they are called
-_READER = re.compile(r"(^\w+ )?\b(\w+_(?:column|baked_texel|lobes|energies))\(", re.MULTILINE)
-
-
-def handed(code: str, texture: str, argument: str) -> str:
-    """Code whose functions are given their texture, which they declare as an argument."""
-
-    def given(found: re.Match[str]) -> str:
-        return f"{found[1] or ''}{found[2]}({argument if found[1] else texture}, "
-
-    return _READER.sub(given, code)
 
 
 # Modules of JavaScript -----------------------------------------------------------------------------------------------

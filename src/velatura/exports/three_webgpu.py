@@ -31,18 +31,19 @@ def write(request: Request) -> Export:
     """
     printer = Tsl(half=True)
     made, around = real_time.lit(request, printer), real_time.environment(request)
-    texture = next(iter(made.textures), "")
-    code = real_time.handed(made.code, texture, f"{texture}: texture_2d<f32>") if texture else made.code
+    texture = made.texture
+    argument = f"{texture}: texture_2d<f32>"
     functions = {name: printer.spelled(text) for name, text in around.functions.items()}
     return real_time.module(
         _MODULE,
         request,
-        replace(made, code=code, frame=printer.spelled(made.frame)),
+        replace(made, code=made.handed(made.code, argument), frame=printer.spelled(made.frame)),
         replace(around, functions=functions),
         "LayeredMaterial",
         sided="DoubleSide" if made.two_sided else "FrontSide",
-        declared=f"{texture}: texture_2d<f32>, " if texture else "",
-        handed=f"{texture}, " if texture else "",
+        declared=f"{argument}, " if texture else "",
+        lobes=made.handed("vt_lobes(vt_material(uv), wi)", argument),
+        value=made.handed("vt_eval(vt_material(uv), lobes, wi, wo)", argument),
         given=f"{texture}: textures.{texture}, " if texture else "",
         parts="".join(f"  {json.dumps(part)},\n" for part in around.parts),
         rectangle=printer.spelled("\n".join(real_time.RECTANGLE.values())),
@@ -96,13 +97,13 @@ const rectangleOf = wgslFn(
 const frameOf = wgslFn(vt_frame_of), placeOf = wgslFn(vt_place), at = wgslFn(vt_at), rayOf = wgslFn(vt_ray);
 const lobesOf = wgslFn(
   `fn vt_lobes_at({declared}uv: vec2f, wi: vec3f) -> VtLobes {{
-    return vt_lobes({handed}vt_material(uv), wi);
+    return {lobes};
   }}`,
   [model],
 );
 const valueOf = wgslFn(
-  `fn vt_value(uv: vec2f, lobes: VtLobes, wi: vec3f, wo: vec3f) -> vec3f {{
-    return vt_eval(vt_material(uv), lobes, wi, wo);
+  `fn vt_value({declared}uv: vec2f, lobes: VtLobes, wi: vec3f, wo: vec3f) -> vec3f {{
+    return {value};
   }}`,
   [model],
 );
@@ -147,7 +148,8 @@ class Layers extends LightingModel {{
   }}
 
   direct({{ lightDirection, lightColor, reflectedLight }}) {{
-    const value = valueOf({{ uv: uv(), lobes: this.lobes, wi: this.wi, wo: this.within(lightDirection) }});
+    const wo = this.within(lightDirection);
+    const value = valueOf({{ {given}uv: uv(), lobes: this.lobes, wi: this.wi, wo }});
     reflectedLight.directSpecular.addAssign(lightColor.mul(value));
   }}
 

@@ -73,7 +73,7 @@ def _entry(prefix: str) -> str:
 
 def _functions(request: Request, made: real_time.Lit, prefix: str) -> str:
     """The text of the functions."""
-    texture = next(iter(made.textures), "")
+    texture = made.texture
     argument = f"Texture2D<float4> {texture}"
     return prefixed(
         _HLSL.format(
@@ -82,10 +82,10 @@ def _functions(request: Request, made: real_time.Lit, prefix: str) -> str:
             origin=origin(),
             entry=_entry(prefix),
             mark=digest(made).upper(),
-            code=(real_time.handed(made.code, texture, argument) if texture else made.code).strip(),
+            code=made.handed(made.code, argument).strip(),
+            value=made.handed("vt_eval(material, vt_lobes(material, wi), wi, wo)", argument),
             asked=_ASKED if texture else "",
             texture=f"{argument}, " if texture else "",
-            handed=f"{texture}, " if texture else "",
             named="Baked, " if texture else "",
             above="" if made.two_sided else ABOVE,
         ),
@@ -256,7 +256,7 @@ float3 {entry}({texture}float3 View, float3 Light, float3 Normal, float3 Tangent
     float3x3 frame = float3x3(t, b, n);
     float3 wi = normalize(mul(frame, View)), wo = normalize(mul(frame, Light));{above}
     VtMaterial material = vt_material(UV);
-    return vt_eval(material, vt_lobes({handed}material, wi), wi, wo);
+    return {value};
 }}
 
 #endif
