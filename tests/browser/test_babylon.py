@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Iterator
-from pathlib import Path
 
 import chromium
 import in_babylon
@@ -15,8 +13,6 @@ import pytest
 import velatura as vt
 
 pytestmark = pytest.mark.skipif(bool(chromium.missing()), reason=chromium.missing())
-
-SIZE, TILT = 24, 0.6
 
 
 @pytest.fixture(scope="module")
@@ -30,20 +26,12 @@ def stage() -> Iterator[in_three.Stage]:
 def test_environments_light_a_ball_as_the_model_says(stage: in_three.Stage) -> None:
     """Expected: the mean of 512 samples for each pixel, within .03 of white as displays have it; the engine's panoramas
     begin a quarter of a turn from those of three.js, whose test draws brushed layers by the same code."""
-    preset, sky = "glossy-plastic", in_three.softbox()
-    [expected] = in_three.sampled(preset, [np.roll(sky, -(sky.shape[1] // 4), axis=1)], SIZE, 512, TILT)
-    found = stage.ball(vt.export(preset, "babylon").text, sky, SIZE, tilt=TILT)
-    assert in_three.matched(expected, found) < 0.03
+    quarter = in_three.softbox().shape[1] // 4
+    assert in_three.missed_by_environment(stage, "glossy-plastic", "babylon", 512, quarter) < 0.03
 
 
 def test_lights_meet_the_model_itself(stage: in_three.Stage) -> None:
-    """Expected: values in NumPy, within 5 % in a highlight on a mesh, with texels in half precision; a light of
-    intensity 1 has irradiance 1 for a surface that faces it."""
-    light = np.array([0.5, 0.6, 0.6]) / np.linalg.norm([0.5, 0.6, 0.6])
-    found = stage.ball(vt.export("glossy-plastic", "babylon").text, in_three.softbox(), SIZE, light=tuple(light))
-    pixels = [(12, 12), (8, 14), (5, 12), (15, 6)]
-    expected = in_three.by_the_model("glossy-plastic", light, pixels, SIZE)
-    np.testing.assert_allclose([found[row, column, :3] for row, column in pixels], expected, rtol=0.05, atol=1e-3)
+    in_three.meets_light(stage, "glossy-plastic", "babylon", (0.5, 0.6, 0.6))
 
 
 def test_names_do_not_reach_the_engine_s_preprocessor(stage: in_three.Stage) -> None:
@@ -57,12 +45,8 @@ def test_names_do_not_reach_the_engine_s_preprocessor(stage: in_three.Stage) -> 
 
 def test_the_page_of_the_manual_draws(stage: in_three.Stage) -> None:
     """Expected: the page as it is printed draws the material, with no complaint on its console."""
-    manual = Path(__file__).parents[2] / "docs" / "how-to" / "in-my-engine.md"
-    _, _, page = re.findall(r"```html\n(.*?)```", manual.read_text(encoding="utf-8"), re.DOTALL)
-    sky = in_three.radiance(in_three.softbox())
-    stage.files.update(
-        {"gold.js": vt.export("bare-gold", "babylon", "bati2021").text, "page.html": page, "sky.hdr": sky}
-    )
+    gold, sky = vt.export("bare-gold", "babylon", "bati2021").text, in_three.radiance(in_three.softbox())
+    stage.files.update({"gold.js": gold, "page.html": in_three.manual_page(2), "sky.hdr": sky})
     picture, complaints = stage.visit("page.html", ready="BABYLON.EngineStore.LastCreatedScene?.isReady()")
     assert not complaints
     red, _, blue = picture[32 - 8 : 32 + 8, 32 - 8 : 32 + 8].mean(axis=(0, 1))

@@ -31,6 +31,8 @@ RADIUS = 0.98
 EDGE = 0.999  # of the radius: nearer to the edge, interpolated normals of a mesh are not those of the sphere
 ADDRESS = "https://engine.test/"  # pages without encryption have no WebGPU
 Rectangle = tuple[float, float, tuple[float, float, float]]  # width, height and middle; shines at the origin with 1
+SIZE, TILT = 24, 0.6  # of balls that are compared
+PIXELS = [(12, 12), (8, 14), (5, 12), (15, 6)]
 LAMP: Rectangle = (2.0, 1.2, (1.5, 1.2, 1.8))
 
 _SCENE = """
@@ -283,9 +285,14 @@ def frame_at(row: int, column: int, size: int) -> Array:
     return np.stack([t / np.linalg.norm(t), np.cross(n, t) / np.linalg.norm(t), n])
 
 
+def body_of(material: MaterialLike) -> SideBySide:
+    """The default model of a material."""
+    return SideBySide.of([(1, Material.of(vt.load(material)))], named("velatura"))
+
+
 def by_the_model(material: MaterialLike, light: Array, pixels: Sequence[tuple[int, int]], size: int) -> Array:
     """Values of the model (pixels, 3) at rows and columns of the ball, for light from a direction."""
-    body = SideBySide.of([(1, Material.of(vt.load(material)))], named("velatura"))
+    body = body_of(material)
     frames = [frame_at(row, column, size) for row, column in pixels]
     values = (body.eval_pdf(tuple(frame[:, 2, None]), tuple((frame @ light)[:, None]))[0] for frame in frames)
     return np.array([np.ravel(value) for value in values])
@@ -295,7 +302,7 @@ def by_rectangle(
     material: MaterialLike, rectangle: Rectangle, pixels: Sequence[tuple[int, int]], size: int, count: int = 128
 ) -> Array:
     """Light of the model (pixels, 3) at rows and columns of the ball, by `count` squared points of a rectangle."""
-    body = SideBySide.of([(1, Material.of(vt.load(material)))], named("velatura"))
+    body = body_of(material)
     width, height, middle = rectangle
     n = -np.array(middle) / np.linalg.norm(middle)
     u = np.cross([0, 1, 0], n)
@@ -314,13 +321,38 @@ def by_rectangle(
     return np.array(found)
 
 
-def missed(stage: Stage, material: MaterialLike, to: str, size: int = 24) -> float:
+def missed_by_rectangle(stage: Stage, material: MaterialLike, to: str) -> float:
     """How far a ball under `LAMP`, by a module of a format, is from the model, as `matched` has it."""
-    found = stage.ball(vt.export(material, to).text, softbox(), size, rectangle=LAMP)
-    places = [(row, column) for row in range(1, size, 2) for column in range(1, size, 2)]
-    pixels = [place for place in places if np.hypot(*np.subtract(place, (size - 1) / 2)) < 0.95 * RADIUS * size / 2]
-    expected = np.pad(by_rectangle(material, LAMP, pixels, size), ((0, 0), (0, 1)), constant_values=1)
+    found = stage.ball(vt.export(material, to).text, softbox(), SIZE, rectangle=LAMP)
+    places = [(row, column) for row in range(1, SIZE, 2) for column in range(1, SIZE, 2)]
+    pixels = [place for place in places if np.hypot(*np.subtract(place, (SIZE - 1) / 2)) < 0.95 * RADIUS * SIZE / 2]
+    expected = np.pad(by_rectangle(material, LAMP, pixels, SIZE), ((0, 0), (0, 1)), constant_values=1)
     return matched(expected, np.array([found[place] for place in pixels]))
+
+
+def missed_by_environment(stage: Stage, material: MaterialLike, to: str, samples: int, turned: int = 0) -> float:
+    """The same under `softbox`, by means of so many samples for each pixel; engines may have it turned by columns."""
+    sky = softbox()
+    [expected] = sampled(material, [np.roll(sky, -turned, axis=1)], SIZE, samples, TILT)
+    return matched(expected, stage.ball(vt.export(material, to).text, sky, SIZE, tilt=TILT))
+
+
+def meets_light(stage: Stage, material: MaterialLike, to: str, towards: tuple[float, float, float]) -> None:
+    """Fails if pixels of a ball under a light are not values in NumPy, within 5 % in a highlight on a mesh, with texels
+    in half precision; a light of intensity 1 has irradiance 1 for a surface that faces it."""
+    light = np.array(towards) / np.linalg.norm(towards)
+    found = stage.ball(vt.export(material, to).text, softbox(), SIZE, light=tuple(light))
+    expected = by_the_model(material, light, PIXELS, SIZE)
+    assert expected.max() > 0.01
+    np.testing.assert_allclose([found[row, column, :3] for row, column in PIXELS], expected, rtol=0.05, atol=1e-3)
+
+
+def manual_page(number: int) -> str:
+    """A page of HTML that the manual prints for engines, by its number there."""
+    manual = Path(__file__).parents[2] / "docs" / "how-to" / "in-my-engine.md"
+    pages: list[str] = re.findall(r"```html\n(.*?)```", manual.read_text(encoding="utf-8"), re.DOTALL)
+    assert len(pages) == 3
+    return pages[number]
 
 
 def radiance(sky: Array) -> bytes:
@@ -349,7 +381,7 @@ def sampled(material: MaterialLike, skies: Sequence[Array], size: int, samples: 
     generator = np.random.default_rng(5)
     u, u1, u2 = (generator.random((3, count, 1)) + np.array(at_nodes(1, samples))[:, None]) % 1
     wi = tuple(np.repeat(frame[:, 2], samples, axis=1))
-    body = SideBySide.of([(1, Material.of(vt.load(material)))], named("velatura"))
+    body = body_of(material)
     asked = Query(radiance=False)
     wo = np.array(np.broadcast_arrays(*body.sample(wi, u.ravel(), u1.ravel(), u2.ravel(), asked)))
     w = np.einsum("kan,kns->ans", frame, wo.reshape(3, count, samples))
