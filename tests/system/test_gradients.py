@@ -44,6 +44,12 @@ GAP = vt.Stack(  # a pane of a medium that is rarer than the outside
     [vt.Interface(eta=1.354, alpha=0.245), vt.Interface(eta=1.643, alpha=0.533)], exterior=1.7045, thin=True
 )
 ROUND = vt.Stack([vt.Interface(conductor="mirror", alpha=0.2)])
+CROSSED = vt.Stack(  # once an axis of the metal shrinks
+    [vt.Interface(eta=1.34, alpha=(0.42, 0.85)), vt.Interface(conductor="Te-e_palik", alpha=1.0)]
+)
+NEARLY_ROUND = vt.Stack(  # another axis is the longer one over a step
+    [vt.Interface(eta=1.12, alpha=(0.507, 0.513)), vt.Interface(conductor="Te-e_palik", alpha=1.0)]
+)
 UP, DOWN = (-0.45, -0.15, 0.75), (-0.45, -0.15, -0.75)
 
 
@@ -203,6 +209,41 @@ def test_one_variable_for_both_axes_leaves_an_interface_isotropic(monkeypatch: p
             float(value(vt.bsdf(COATED.replace(**{f"layer{layer}_alpha": end})), UP)[0]) for end in (x - step, x + step)
         )
         assert np.isclose(float(dr.grad(alpha)[0]), (high - low) / (2 * step), rtol=0.02, atol=0.003)
+
+
+@pytest.mark.parametrize(
+    ("stack", "key", "ends"),
+    [(CROSSED, "layer1_alpha_v", (0.94, 1.0)), (NEARLY_ROUND, "layer0_alpha_u", (0.94, 1.06))],
+    ids=["crossed", "nearly round"],
+)
+def test_a_gradient_by_an_axis_that_gets_alike_to_the_other_is_a_difference(
+    stack: vt.Stack, key: str, ends: tuple[float, float]
+) -> None:
+    """Of all light, over the step: there the interface is brushed along another axis, and lobes are parted."""
+    bsdf, rng = vt.bsdf(stack), np.random.default_rng(1)
+    parameters, count = mi.traverse(bsdf), 1 << 12
+    si = dr.zeros(mi.SurfaceInteraction3f, count)
+    si.wi, wo = (mi.warp.square_to_uniform_hemisphere(mi.Point2f(rng.random((2, count)))) for _ in range(2))
+
+    def light() -> Any:
+        called = dr.opaque(mi.BSDFPtr, bsdf, count)
+        return 2 * dr.pi * dr.mean(dr.mean(called.eval(mi.BSDFContext(), si, wo)))
+
+    x = stack.flat()[key]
+    variable = mi.Float(x)
+    dr.enable_grad(variable)
+    parameters[key] = variable
+    parameters.update()
+    dr.backward(light())
+    low, high = (_lit_at(parameters, key, share * x, light) for share in ends)
+    over = (ends[1] - ends[0]) * x
+    assert float(dr.grad(variable)[0]) * over == pytest.approx(high - low, rel=0.1, abs=5e-4)
+
+
+def _lit_at(parameters: Any, key: str, x: float, light: Callable[[], Any]) -> float:
+    parameters[key] = mi.Float(x)
+    parameters.update()
+    return float(light()[0])
 
 
 def test_a_colour_is_optimised_from_grey() -> None:

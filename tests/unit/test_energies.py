@@ -324,6 +324,18 @@ def test_modes_of_the_azimuth_agree_on_isotropic_stacks(often: bool) -> None:
 
 
 @pytest.mark.parametrize("often", [False, True], ids=["once", "often"])
+def test_nearly_isotropic_interfaces_have_the_energies_of_isotropic_ones(often: bool) -> None:
+    """Very rough glass, whose few normals are off by 1 % where light meets them often: by as much."""
+
+    def pane(alpha: float) -> Energies:
+        return solved(Stack([Interface(eta=1.8, alpha=0.13), Interface(eta=1.0, alpha=[alpha, 1.0])]), often, 0.4)
+
+    alike, brushed = pane(1.0), pane(1 - 1e-6)
+    for x in ("lobes", "rest", "straight", "bounced", "passed"):
+        assert getattr(brushed, x) == pytest.approx(getattr(alike, x), abs=2e-5), x
+
+
+@pytest.mark.parametrize("often", [False, True], ids=["once", "often"])
 def test_brushed_metals_look_alike_from_all_azimuths_about_the_normal(often: bool) -> None:
     """There light has no side: the error of few normals is the same for all."""
     stack = Stack([Interface(eta=(0.14, 0.37, 1.44), k=(3.98, 2.39, 1.6), alpha=[0.1, 0.4])])

@@ -319,7 +319,8 @@ class FirstEvents:
         sin = ops.minimum(p / n, SIN_AT_FACETS_MAX)
         # Light comes from wi, and travels to -wi
         wi = -sin * ops.cos(psi), -sin * ops.sin(psi), ops.sqrt(1 - sin * sin)
-        h = ggx.sample_visible(wi, *alpha, u_2 + turns * psi, u_1)
+        turn = turns * psi
+        h = ggx.sample_visible(wi, *alpha, u_2 + turn, u_1)
         cosine = ops.minimum(ggx.dot(wi, h), 1.0)
         o, here = ggx.reflect(wi, h), _smith(wi, alpha)
         reflectance, passing = self._divided(cosine, eta, colours)
@@ -336,14 +337,14 @@ class FirstEvents:
             below = n * eta
             lights.append(Light(below * x, below * y, [t * share * each for each in through for t in passing]))
             others += [t * share * (1 - through[-1]) for t in passing]
-        again, twice = self._later(wi, h, u_2 / share, values) if self.again else ([], [])
+        again, twice = self._later(wi, h, u_2 / share, turn, values) if self.again else ([], [])
         return [*lights, *again], [*others, blocked * share, *twice]
 
     def _later(
-        self, wi: Direction, h: Direction, number: Value, values: Sequence[Value]
+        self, wi: Direction, h: Direction, number: Value, turn: Value, values: Sequence[Value]
     ) -> tuple[list[Light], list[Value]]:
-        """Light of second and third events of samples of running numbers, which first meet normals h; and all that is
-        reflected twice."""
+        """Light of second and third events of samples of running numbers, which first meet normals h, by normals that
+        turn as the first ones; and all that is reflected twice."""
         n, alpha_u, alpha_v, _, eta, straight, share, *colours = values
         alpha = alpha_u, alpha_v
         u = [number * step - ops.floor(number * step) for step in STEPS]
@@ -356,13 +357,13 @@ class FirstEvents:
         # A share of what is refracted passes all other facets
         met = [way._replace(comes=1 - straight * k) for k, way in enumerate(first)]
         now, each = list(enumerate(met)), []
-        for fly, *of_normal in (u[1:4], u[4:]):
+        for fly, azimuth, height in (u[1:4], u[4:]):
             then = []
             for side, way in now:
                 events, *indices = sides[side]
                 rank = ops.minimum(microsurface.fly(way.w, way.rank, *alpha, fly * (1 - way.leaves)), 1.0)
                 back = -way.w[0], -way.w[1], -way.w[2]
-                h = ggx.sample_visible(back, *alpha, *of_normal)
+                h = ggx.sample_visible(back, *alpha, azimuth + turn, height)
                 outcomes = events._outcomes(back, h, rank, way.weights, way.comes * (1 - way.leaves), alpha, *indices)
                 then += [((side + k) % 2, outcome) for k, outcome in enumerate(outcomes)]
             now = then

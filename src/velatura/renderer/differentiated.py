@@ -57,15 +57,29 @@ class Variables:
         return (low, high) if low < high else ends
 
     def by_whole(self) -> Iterator[tuple[int, float, tuple[float, float]]]:
-        """Indices by which slopes are differences of whole BSDFs: the number of the variable, its value, and the ends
-        of the step. They are beside a kink, where steps end or over which another side of an interface gets the denser
-        one, or light passes a medium rarer than the outside: its edges, beyond which facets face away, move."""
+        """Numbers whose slopes are differences of whole BSDFs: the number of the variable, its value, and the ends of
+        the step. They are beside a kink. Of indices, steps end there, or over them another side of an interface gets
+        the denser one, or light passes a medium rarer than the outside: its edges, beyond which facets face away, move.
+        Over those of a roughness, the axes of an interface among others become alike, or pass each other: it is brushed
+        along another one, and lobes are parted anew.
+        """
         edged = self.start.transmits and not _denser(self.start).all()
         for k, x in enumerate(self._numbers):
-            if self.addresses[self.given[k].places[0][0]].role == "eta":
-                ends = self.around(k, x)
-                if edged or x in ends or len({_steps(self._with(self.start, k, each)) for each in ends}) > 1:
-                    yield k, x, ends
+            role, ends = self.addresses[self.given[k].places[0][0]].role, self.around(k, x)
+            if role == "eta":
+                beside = edged or x in ends or len({_steps(self._with(self.start, k, each)) for each in ends}) > 1
+            else:
+                beside = role in ("alpha_u", "alpha_v") and len(self.start.interfaces) > 1 and self._passes(k, ends)
+            if beside:
+                yield k, x, ends
+
+    def _passes(self, k: int, ends: tuple[float, float]) -> bool:
+        """Whether an axis of an interface gets alike to the other one between the ends of a step of a variable."""
+        low, high = ([*self._with(self.start, k, each).interfaces] for each in ends)
+        return any(
+            (a.alpha_u - a.alpha_v) * (b.alpha_u - b.alpha_v) <= 0 and a.alpha_u - a.alpha_v != b.alpha_u - b.alpha_v
+            for a, b in zip(low, high)
+        )
 
     def ends(self, material: Material) -> Iterator[Material]:
         """A material of NumPy's values with the numbers at both ends of the step of each variable."""
