@@ -21,7 +21,8 @@ sys.path.append(bpy.utils.resource_path("LOCAL") + f"/python/lib/python3.{sys.ve
 def main(job: dict[str, Any]) -> None:
     """Pictures (lights, seeds, height, width, 3) of each material, to the file named.
 
-    Of a job with `cosines`, pictures (cosines, height, width, 3) along one direction each, under a white world.
+    Of a job with `cosines`, pictures (cosines, height, width, 3) along one direction each, under a white world, of the
+    middle of the plane, or of its point `at`.
     """
     for script, output in job["materials"]:
         scene = _scene(job)
@@ -77,7 +78,8 @@ def _along(scene: Any, job: dict[str, Any], cosine: float) -> np.ndarray:
     """Light from one direction, in the plane of the tangent."""
     away = Vector((math.sqrt(1 - cosine * cosine), 0, cosine))
     scene.camera.data.type, scene.camera.data.ortho_scale = "ORTHO", 0.1
-    scene.camera.location, scene.camera.rotation_euler = 3 * away, (-away).to_track_quat("-Z", "Y").to_euler()
+    at = Vector((*job.get("at", (0, 0)), 0))
+    scene.camera.location, scene.camera.rotation_euler = at + 3 * away, (-away).to_track_quat("-Z", "Y").to_euler()
     return _picture(scene, job, None, job["seeds"][0])
 
 
