@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Callable
 from pathlib import Path
 
+import numpy as np
+
 from velatura.inverse.fitting.angles import ReflectanceTable
 from velatura.inverse.measured import astm, csv_table, merl, pbrdf, rgl, tensors, zemax
 
@@ -27,7 +29,8 @@ def load_table(path: str | Path) -> ReflectanceTable:
         MissingTool: an RGL file, and there is no Mitsuba, or no LLVM for it.
     """
     path = Path(path)
-    return READERS.get(path.suffix.lower(), csv_table.read)(path)
+    with np.errstate(invalid="ignore"):  # readers refuse what is no number, which warns where it is cast
+        return READERS.get(path.suffix.lower(), csv_table.read)(path)
 
 
 def _bsdf(path: Path) -> ReflectanceTable:
