@@ -15,9 +15,10 @@ from machines import Changing, Machine
 from velatura import tables
 from velatura.editor import messages
 from velatura.films.of_material import films_of
+from velatura.model import rotation_frame
 from velatura.model.context import at_a_point
 from velatura.model.papers import bsdf
-from velatura.model.solved import rotation_frame, solve
+from velatura.model.solved import solve
 from velatura.model.solved.solve import Solver
 from velatura.optics import ggx
 from velatura.shader import Recording, Shader, constant, material, record, shader, variance

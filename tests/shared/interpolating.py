@@ -16,10 +16,10 @@ import numpy as np
 from velatura.editor import tabulated
 from velatura.editor.messages import array
 from velatura.editor.shading import solved_look_up
-from velatura.model import Model
+from velatura.model import Model, rotation_frame
 from velatura.model.base import Body
 from velatura.model.context import Context
-from velatura.model.solved import rotation_frame, solve
+from velatura.model.solved import solve
 from velatura.model.variance import variance_kind
 from velatura.renderer import compiled, directional_grid
 from velatura.shader import constant

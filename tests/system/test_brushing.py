@@ -58,6 +58,28 @@ def test_a_field_is_the_rotation_that_it_names_at_every_point(shape: str, field:
         np.testing.assert_allclose(found[:, i], turned[:, 0], rtol=2e-4, atol=1e-6)
 
 
+@pytest.mark.parametrize("model", ["belcour2018", "velatura"])
+def test_very_long_facets_turn_with_their_rotation(model: str) -> None:
+    """In single precision a matrix of their axes does not hold the shorter one."""
+    rng, count, degrees = np.random.default_rng(3), 512, 40.0
+    slopes = rng.normal(size=(2, count)) * [[2e-3], [0.5]]  # about the facets' own
+    h = np.stack([*slopes, np.ones(count)]) / np.sqrt(1 + (slopes**2).sum(axis=0))
+    wi = np.array([0.2, 0.1, np.sqrt(0.95)])
+    wo = 2 * (wi @ h) * h - wi[:, None]
+    c, s = np.cos(np.radians(degrees)), np.sin(np.radians(degrees))
+    turn = np.array([[c, -s, 0], [s, c, 0], [0, 0, 1]])
+
+    def light(rotation: float, by: np.ndarray) -> np.ndarray:
+        layers = [Interface(eta=1.4, alpha=(0.003, 1.0), rotation=rotation), Interface(conductor="Al", alpha=0.3)]
+        si = dr.zeros(mi.SurfaceInteraction3f, count)
+        si.wi = mi.Vector3f(*map(float, by @ wi))
+        found = vt.bsdf(Stack(layers), model).eval(mi.BSDFContext(), si, mi.Vector3f(by @ wo))
+        return np.where(wo[2] > 0, np.array(found), 0)
+
+    straight, turned = light(0.0, np.eye(3)), light(degrees, turn)
+    assert np.abs(turned - straight).sum() < 2e-3 * straight.sum()
+
+
 def test_a_field_has_no_seam() -> None:
     """Expected: on both sides of where its angle jumps by a turn, the material is the same."""
     si = seen({"type": "rectangle"}, [[-0.5, 1e-5], [-0.5, -1e-5]])

@@ -50,9 +50,11 @@ class PaperModel(Model):
         return SWITCHES[key]
 
     def body(self, material: Material, variance: type[Variance], context: Context) -> Body:
+        from velatura.model import rotation_frame
         from velatura.model.papers import bsdf
 
-        return bsdf.body(material, self, variance, context)
+        frame = rotation_frame.frame(material)
+        return frame.turned(bsdf.body(frame.back(material), self, frame.kind(variance), context), material)
 
     def statistics(self, material: Material, wi: Direction) -> StackLobes:
         from velatura.model.papers import statistics

@@ -61,7 +61,8 @@ class SolvedModel(Model):
 
     def body(self, material: Material, variance: type[Variance], context: Context) -> Body:
         from velatura import metals
-        from velatura.model.solved import rotation_frame, smooth_metal, solve, whole_differences
+        from velatura.model import rotation_frame
+        from velatura.model.solved import smooth_metal, solve, whole_differences
         from velatura.model.solved.energies.wavelengths import WAVELENGTHS
 
         if not _is_solved(material):
@@ -79,8 +80,9 @@ class SolvedModel(Model):
     def lit(self, material: Material, wi: Direction) -> Callable[[Any], Body]:
         if self.form != "forward" or not _is_solved(material):
             return super().lit(material, wi)
+        from velatura.model import rotation_frame
         from velatura.model.context import Context
-        from velatura.model.solved import rotation_frame, solve
+        from velatura.model.solved import solve
         from velatura.model.variance import variance_kind
         from velatura.optics import ggx
 

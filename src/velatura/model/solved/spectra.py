@@ -17,11 +17,11 @@ from velatura import ops
 from velatura.films.of_material import greatest_optical_thickness_nm
 from velatura.model.base import Body, Model
 from velatura.model.context import Context
+from velatura.model.rotation_frame import Frame, frame
 from velatura.model.rough_interface import Facets
 from velatura.model.solved import monotone_cubic
 from velatura.model.solved.columns import Declaration
 from velatura.model.solved.energies.adding import Lambert, Part, parts
-from velatura.model.solved.rotation_frame import Frame, frame
 from velatura.model.solved.solve import Layout, SolvedSide, Solver, plain, sides
 from velatura.model.solved.texture_axes import Wavelengths
 from velatura.model.variance import Variance

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from velatura import tables
 from velatura.model.base import Model
 from velatura.model.lobe_statistics import LobeStatistics, StackLobes, nearer_axis, with_axes_named
+from velatura.model.rotation_frame import Frame
 from velatura.model.rough_interface import Facets
 from velatura.model.roughness_maps import MAPS
 from velatura.model.solved import equivalent_roughness
@@ -19,7 +20,6 @@ from velatura.model.solved.energies.energies import Energies, energies
 from velatura.model.solved.energies.media import Slab
 from velatura.model.solved.guards import ENERGY_EPS
 from velatura.model.solved.lobes import refracted_lobe, widths
-from velatura.model.solved.rotation_frame import Frame
 from velatura.model.solved.sample_allocation import Demand
 from velatura.model.solved.solve import Layout, layout_of, shapes_of
 from velatura.model.solved.transmission import combined, direct

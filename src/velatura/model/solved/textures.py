@@ -24,12 +24,12 @@ from velatura import ops
 from velatura.films import textured as textured_films
 from velatura.model.base import Body, Model
 from velatura.model.context import Context, at_a_point
+from velatura.model.rotation_frame import Frame
 from velatura.model.solved import solve, texture_axes, wide_light
 from velatura.model.solved.bsdf import Side, Solved
 from velatura.model.solved.columns import Columns
 from velatura.model.solved.guards import ENERGY_EPS
 from velatura.model.solved.lobes import remainder, top_medium
-from velatura.model.solved.rotation_frame import Frame
 from velatura.model.solved.solve import Layout, SolvedSide, Solver
 from velatura.model.solved.texture_axes import BESIDE, COARSE, WAVES_MAX, WAVES_OF_TWO, Range, TextureAxis, Wavelengths
 from velatura.model.solved.transmission.combined import Parts

@@ -20,16 +20,16 @@ from velatura import ops
 from velatura.media import of_material
 from velatura.media.of_material import two_lobes
 from velatura.media.tabulated import Tabulated
-from velatura.model import Model
+from velatura.model import Model, rotation_frame
 from velatura.model.base import Body
 from velatura.model.context import Context, at_a_point
-from velatura.model.solved import rotation_frame, solve, wide_light
+from velatura.model.rotation_frame import Frame, Turned
+from velatura.model.solved import solve, wide_light
 from velatura.model.solved.bsdf import Side, Solved
 from velatura.model.solved.columns import WIDE_SIDES, Columns, Declaration
 from velatura.model.solved.lobes import top_medium, wide
 from velatura.model.solved.lobes.remainder import Remainder
 from velatura.model.solved.lobes.top_medium import PassedMedium, TopMedium
-from velatura.model.solved.rotation_frame import Frame, Turned
 from velatura.model.solved.solve import Layout, SolvedSide, Solver
 from velatura.model.solved.transmission import direct
 from velatura.model.solved.transmission.combined import Parts

@@ -1,7 +1,8 @@
 """Materials turned about the normal.
 
-Brushed ones are solved in the axes of their first brushed interface: so all turns exactly where all layers do, at any
-azimuths that they are solved at.
+Brushed ones are solved, and those in closed form looked at, in the axes of their first brushed interface: so all turns
+exactly where all layers do, at any azimuths that they are solved at, and in single precision, which holds no matrix of
+axes that are a thousand times as long as others.
 """
 
 from __future__ import annotations
