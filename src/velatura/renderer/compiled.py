@@ -34,7 +34,7 @@ Array = NDArray[Any]
 
 MANY = 500_000  # values of a kind, about as long as a kernel of it takes to compile where none is kept on disk
 FEW_LIGHTS = 8  # that fall on rows, beyond which values take as long again
-LONG = 256  # numbers that a kernel reads, beyond which it is never compiled: that would take seconds
+LONG = 320  # numbers that a kernel reads, of nine interfaces, beyond which it is never compiled: that would take long
 LEAST = 2_000  # values at a time: for fewer, a kernel takes longer to launch than NumPy to run
 SHARED = 2_000_000  # values at a time, from which several threads run a kernel; see `_lanes`
 BLOCK = 1 << 15  # values at a time, which a processor's cache holds
