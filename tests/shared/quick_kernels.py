@@ -4,13 +4,19 @@ from __future__ import annotations
 
 import ctypes
 import os
+from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 from velatura import kernel
+from velatura.renderer import compiled
 
 # Dr.Jit asks LLVM for -O2 and has no flag for less, but LLVM takes the options of its command line in any process.
 # Passes that may be left out are, and registers are allocated one basic block at a time; the arithmetic is the same.
-OPTIONS = ("-opt-bisect-limit=0", "-optimize-regalloc=false", "-regalloc=fast")
+QUICKLY = "-opt-bisect-limit=0", "-optimize-regalloc=false"
+
+# As programs do: of `renderer.compiled`, whose loops over sources and samples run for longer than that takes
+WELL = "-opt-bisect-limit=2147483647", "-optimize-regalloc=true"
 
 # llvm::errs(), and llvm::raw_fd_ostream(int fd, bool shouldClose, bool unbuffered, OStreamKind)
 ERRORS = "_ZN4llvm4errsEv"
@@ -27,11 +33,33 @@ def compile_quickly(cache: Path) -> None:
     os.environ["DRJIT_CACHE_DIR"] = str(cache)
     if kernel.llvm() is None:
         return
-    options = [b"tests", *map(str.encode, OPTIONS)]
-    for llvm in _loaded("libLLVM"):
-        if hasattr(llvm, STREAM):
-            _silence(llvm)
-            llvm.LLVMParseCommandLineOptions(len(options), (ctypes.c_char_p * len(options))(*options), None)
+    libraries = [llvm for llvm in _loaded("libLLVM") if hasattr(llvm, STREAM)]
+    for llvm in libraries:
+        _silence(llvm)
+        _ask(llvm, QUICKLY)
+    original = compiled._kernel
+
+    def of_loops(*arguments: Any) -> Any:
+        found = original(*arguments)
+
+        def launch(*given: Any) -> Any:
+            for llvm in libraries:
+                _ask(llvm, WELL)
+            try:
+                return found.launch(*given)
+            finally:
+                for llvm in libraries:
+                    _ask(llvm, QUICKLY)
+
+        return replace(found, launch=launch)
+
+    compiled._kernel = of_loops
+
+
+def _ask(llvm: ctypes.CDLL, options: tuple[str, ...]) -> None:
+    """Hand LLVM a command line, in 10 us. Of an option that it has been given before, the last value holds."""
+    line = [b"tests", *map(str.encode, options)]
+    llvm.LLVMParseCommandLineOptions(len(line), (ctypes.c_char_p * len(line))(*line), None)
 
 
 def _silence(llvm: ctypes.CDLL) -> None:
