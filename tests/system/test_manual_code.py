@@ -27,7 +27,7 @@ import yaml
 from manual import BLOCK, PAGES, ROOT, blocks, written
 
 import velatura as vt
-from velatura import api, comparison, figures, inverse, sweeps
+from velatura import api, comparison, figures, inverse, kernel, sweeps
 from velatura.benchmark import cost, scores, stacks
 from velatura.cli import app
 from velatura.comparison import evaluated_lobes, pictures, plugins
@@ -303,7 +303,9 @@ def test_a_script_of_the_gallery_runs(
     """In pictures of the size that it asks for, which it may put together."""
     pyplot = pytest.importorskip("matplotlib.pyplot")
     monkeypatch.chdir(tmp_path)
-    monkeypatch.setattr(api, "render", with_less(inspect.unwrap(api.render), spp=2))
+    mitsuba = kernel.mitsuba("llvm_ad_rgb")
+    for module in (api, mitsuba):
+        monkeypatch.setattr(module, "render", with_less(inspect.unwrap(module.render), spp=2))
     runpy.run_path(str(script), run_name="__main__")
     pyplot.close("all")
 
