@@ -291,7 +291,8 @@ class _Program:
 
 def _helpers(shader: str) -> list[str]:
     """The functions that a shader calls."""
-    return [text for called, text in _HELPERS.items() if re.search(rf"\b{called}\(", shader)]
+    called = set(re.findall(r"[A-Za-z_]\w*(?=\()", shader))  # once, since a shader has megabytes of numbers
+    return [text for name, text in _HELPERS.items() if name in called]
 
 
 @cache
