@@ -75,3 +75,31 @@ def test_energies_are_those_of_lobes() -> None:
     lobes = vt.lobes(stack, cosine[20::10])
     total = sum(np.asarray(energy) for energy in lobes.energy) + np.asarray(lobes.remainder)
     np.testing.assert_allclose(found.energy[0, 20::10].sum(axis=1).T, total, atol=5e-3)
+
+
+@pytest.mark.parametrize(("shape", "sides"), [((64,), 1), ((32, 17), 2)])
+def test_sums_give_the_numbers_back(shape: tuple[int, ...], sides: int) -> None:
+    """Expected: energies and blurs that follow three smooth functions of direction, to rounding, by one texel; a
+    fourth part of noise, within what it may displace, by more."""
+    rng = np.random.default_rng(3)
+    over = rng.random((sides, int(np.prod(shape)), 3)) @ np.linalg.qr(rng.normal(size=(3, 3)))[0]
+
+    def part(count: int, noise: float = 0.0) -> tuple[np.ndarray, np.ndarray]:
+        energy = 0.5 + 0.1 * over @ rng.uniform(-1, 1, (3, 3))
+        seen = 0.3 + 0.05 * np.einsum("snk,kjm->snjm", over, rng.uniform(-1, 1, (3, count, 4)))
+        return energy + noise * rng.random(energy.shape), seen + noise * rng.random(seen.shape)
+
+    for noise, texels in ((0.0, 1), (0.1, 3)):
+        energies, seen = zip(part(1), part(2, noise))
+        found = Prefiltered(np.stack(energies, axis=2), seen, shape, [False, True])
+        sums = prefiltered.summed(found)
+        assert (len(sums.texels) == texels) == (noise == 0) or len(sums.texels) >= texels
+        assert np.abs(sums.texels).max() <= 1 + 1e-9
+        grid = sums.texels.reshape(len(sums.texels), sides, *shape[1:], shape[0], 4)
+        of_nodes = np.moveaxis(grid, 0, -2).reshape(sides, -1, shape[0], 4 * len(sums.texels)).swapaxes(1, 2)
+        of_nodes = of_nodes.reshape(sides, -1, of_nodes.shape[-1])
+        for k, factors in enumerate(sums.factors):
+            values = np.einsum("rcn,sin->sirc", factors[..., :-1], of_nodes) + factors[..., -1]
+            expected = np.concatenate([np.pad(energies[k], ((0, 0), (0, 0), (0, 1)))[:, :, None], seen[k]], axis=2)
+            light = 1 / 0.015  # of a blur of alpha .09, half an energy, a change by 1 displaces more than half of it
+            np.testing.assert_allclose(values, expected, atol=2 / light if noise else 1e-9)

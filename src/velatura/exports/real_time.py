@@ -23,7 +23,7 @@ from velatura.model.variance import Isotropic
 from velatura.shader import Shader, prefiltered, shader
 from velatura.shader.closures import shares
 from velatura.shader.material import title
-from velatura.shader.prefiltered import Prefiltered
+from velatura.shader.prefiltered import Prefiltered, Sums
 from velatura.shader.printers.c_like import CLike
 from velatura.shader.program import PREFIX, described
 from velatura.shader.recorder import recording
@@ -33,7 +33,7 @@ _DEFINED = re.compile(r"^\w+ (\w+)\(", re.MULTILINE)  # a function, whose defini
 
 
 class Row(NamedTuple):
-    """A row of texels over the cosine, one for each azimuth, in the texture of parts: nodes over the cosine and the
+    """A row of texels over the cosine, one for each azimuth, in the texture of sums: nodes over the cosine and the
     azimuth, less 1; rows to that of light from below; the first row."""
 
     columns: int
@@ -43,25 +43,32 @@ class Row(NamedTuple):
 
 
 class Part(NamedTuple):
-    """A part of a stack by its rows: the share of the stack, and the side that it leaves on, 1 or -1 of the view's."""
+    """A part of a stack: the side that it leaves on, 1 or -1 of the view's, and names of functions that give its energy
+    and its blurs."""
 
-    share: float
     side: int
-    energy: Row
-    blurs: Sequence[Row]
+    energy: str
+    blurs: Sequence[str]
+
+
+class Leaf(NamedTuple):
+    """A stack: the rows of its texels, and its parts, whose functions take these texels."""
+
+    rows: Sequence[Row]
+    parts: Sequence[Part]
 
 
 @dataclass(frozen=True)
 class Environment:
-    """The parts of all stacks of a material, and their texture vt_parts, (height, width, 4).
+    """The parts of all stacks of a material, and the texture vt_parts of their sums, (height, width, 4).
 
-    `functions` are by name, in GLSL: where texels lie, and what a blur sees. `text` is the code of GLSL ES with them,
-    which calls vt_blurred(direction, root of alpha).
+    `functions` are by name, in GLSL: where texels lie, what parts are by them, and what a blur sees. `text` is the code
+    of GLSL ES with them, which calls vt_blurred(direction, root of alpha).
     """
 
     text: str
     functions: Mapping[str, str]
-    parts: Sequence[Part]
+    stacks: Sequence[Leaf]
     texture: np.ndarray
 
     @property
@@ -139,46 +146,59 @@ def lit(request: Request, printer: CLike) -> Lit:
 
 def environment(request: Request) -> Environment:
     """The light of a material without textures by an engine's environment."""
-    stacks = zip(shares(request.material), request.material.leaves())
+    leaves = zip(shares(request.material), request.material.leaves())
     parts = [
-        (share, prefiltered.prefiltered(Material.of(stack), request.model)) for share, (_, stack) in stacks if share
+        (share, prefiltered.prefiltered(Material.of(leaf), request.model)) for share, (_, leaf) in leaves if share
     ]
+    azimuths = any(len(found.shape) > 1 for _, found in parts)
+    functions = {"vt_place": _PLACE.format(azimuth=_AZIMUTH if azimuths else "    float azimuth = 0.0;\n"), "vt_at": _AT}
     widest = max(found.shape[0] for _, found in parts)
-    placed, texels, first = list[Part](), [], 0
+    stacks, texels, first = list[Leaf](), [], 0
     for share, found in parts:
-        own = prefiltered.texture(found)
-        placed += _placed(share, found, first)
-        texels.append(np.pad(own, ((0, 0), (0, widest - own.shape[1]), (0, 0))))
+        sums = prefiltered.summed(found)
+        count, sides, turns, cosines, _ = sums.texels.shape
+        rows = [Row(cosines - 1, turns - 1, turns * (sides - 1), first + turns * sides * k) for k in range(count)]
+        stacks.append(Leaf(rows, list(_parts(share, found, sums, functions))))
+        own = sums.texels.reshape(-1, cosines, 4)
+        texels.append(np.pad(own, ((0, 0), (0, widest - cosines), (0, 0))))
         first += len(own)
-    azimuths = any(part.energy.turns for part in placed)
-    functions = {
-        "vt_place": _PLACE.format(azimuth=_AZIMUTH if azimuths else "    float azimuth = 0.0;\n"),
-        "vt_at": _AT,
-        "vt_ray": _RAY,
-    }
-    text = _ENVIRONMENT.format(functions="\n".join(functions.values()), parts="\n".join(map(_statement, placed)))
-    return Environment(text, functions, placed, np.concatenate(texels))
+    functions["vt_ray"] = _RAY
+    text = _ENVIRONMENT.format(functions="\n".join(functions.values()), stacks="\n".join(map(_statement, stacks)))
+    return Environment(text, functions, stacks, np.concatenate(texels))
 
 
-def _placed(share: float, found: Prefiltered, first: int) -> Iterator[Part]:
-    """The parts of a stack whose rows begin at a number."""
-    nodes, turns = (*found.shape, 1)[:2]
-    height = turns * sum(1 + blurs.shape[2] for blurs in found.blurs)
-    below = height if len(found.energy) > 1 else 0
-    for passes, blurs in zip(found.passes, found.blurs):
-        energy, *seen = (Row(nodes - 1, turns - 1, below, first + turns * k) for k in range(1 + blurs.shape[2]))
-        yield Part(share, -1 if passes else 1, energy, seen)
-        first += turns * (1 + blurs.shape[2])
+def _parts(share: float, found: Prefiltered, sums: Sums, functions: dict[str, str]) -> Iterator[Part]:
+    """The parts of a stack of a share, whose functions are added to others."""
+    for passes, (energy, *seen) in zip(found.passes, sums.factors):
+        number = sum(name.startswith("vt_energy_") for name in functions)
+        names = [f"vt_energy_{number}", *(f"vt_blur_{number}_{k}" for k in range(len(seen)))]
+        for name, factors in zip(names, [share * energy, *seen]):
+            functions[name] = _sum(name, factors)
+        yield Part(-1 if passes else 1, names[0], names[1:])
 
 
-def _statement(part: Part) -> str:
-    """A statement of GLSL that adds a part."""
+def _sum(name: str, factors: np.ndarray) -> str:
+    """A function of GLSL that gives four numbers by texels; their factors (4, 4 T + 1)."""
+    texels = [f"t{k}" for k in range(factors.shape[1] // 4)]
 
-    def row(row: Row) -> str:
-        return f"vec4({', '.join(f'{x}.0' for x in row)})"
+    def listed(values: np.ndarray) -> str:
+        return ", ".join(f"{x:.6g}" for x in np.round(np.ravel(values), 9) + 0.0)
 
-    seen = [f"vt_blur({row(blur)}, place, wi, {part.side}.0)" for blur in part.blurs]
-    return f"    sum += {part.share:.6f} * vt_texel(vt_at({row(part.energy)}, place)).rgb * ({' + '.join(seen)});"
+    terms = [f"mat4({listed(factors[:, 4 * k : 4 * k + 4].T)}) * {texel}" for k, texel in enumerate(texels)]
+    arguments = ", ".join(f"vec4 {texel}" for texel in texels)
+    value = "\n        + ".join([*terms, f"vec4({listed(factors[:, -1])})"])
+    return f"vec4 {name}({arguments}) {{\n    return {value};\n}}\n"
+
+
+def _statement(leaf: Leaf) -> str:
+    """A statement of GLSL that adds a stack."""
+    lines, texels = list[str](), ", ".join(f"t{k}" for k in range(len(leaf.rows)))
+    for k, row in enumerate(leaf.rows):
+        lines.append(f"vec4 t{k} = vt_texel(vt_at(vec4({', '.join(f'{x}.0' for x in row)}), place));")
+    for part in leaf.parts:
+        seen = " + ".join(f"vt_light({blur}({texels}), wi, {part.side}.0)" for blur in part.blurs)
+        lines.append(f"sum += max({part.energy}({texels}).rgb, 0.0) * ({seen});")
+    return "\n".join(["    {", *(f"        {line}" for line in lines), "    }"])
 
 
 def _without_comments(code: str) -> str:
@@ -255,7 +275,7 @@ _TANGENT = """\
 
 _ENVIRONMENT = """\
 // The material's parts by the environment: of each its energy, and its blurs. Of a blur how far it leaves beyond the
-// mirror's direction, in the plane of incidence and beside it; root of alpha; share
+// mirror's direction, in the plane of incidence and beside it; root of alpha; share. They are sums of what texels hold
 uniform highp sampler2D vt_parts;
 
 vec4 vt_texel(vec2 texel) {{
@@ -263,8 +283,7 @@ vec4 vt_texel(vec2 texel) {{
 }}
 
 {functions}
-vec3 vt_blur(vec4 rows, vec3 place, vec3 wi, float side) {{
-    vec4 blur = vt_texel(vt_at(rows, place));
+vec3 vt_light(vec4 blur, vec3 wi, float side) {{
     vec4 ray = vt_ray(blur, wi, side);
     return blur.w * vt_blurred(ray.xyz, ray.w);
 }}
@@ -273,7 +292,7 @@ vec3 vt_blur(vec4 rows, vec3 place, vec3 wi, float side) {{
 vec3 vt_environment(vec3 wi) {{
     vec3 place = vt_place(wi);
     vec3 sum = vec3(0.0);
-{parts}
+{stacks}
     return sum;
 }}
 """

@@ -129,7 +129,10 @@ mat3 vt_sky; // from the frame to the environment's
 
 vec3 vt_sky_blurred(vec3 w, float roughness) {{
     #ifdef ENVMAP_TYPE_PMREM
-    float level = floor(8.0 * roughnessToMip(roughness) + 0.5) / 8.0; // that neighbours mostly share
+    // The level of the first of four neighbours, which read one level together
+    float level = roughnessToMip(roughness);
+    vec2 odd = mod(floor(gl_FragCoord.xy), 2.0);
+    level = floor(8.0 * (level - odd.x * dFdx(level) - odd.y * dFdy(level)) + 0.5) / 8.0;
     return envMapIntensity * textureLod(envMap, vt_sky * w, level).rgb;
     #else
     vec3 seen = vt_frame * w; // before r187

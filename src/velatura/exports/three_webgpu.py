@@ -45,9 +45,15 @@ def write(request: Request) -> Export:
         lobes=made.handed("vt_lobes(vt_material(uv), wi)", argument),
         value=made.handed("vt_eval(vt_material(uv), lobes, wi, wo)", argument),
         given=f"{texture}: textures.{texture}, " if texture else "",
-        parts="".join(f"  {json.dumps(part)},\n" for part in around.parts),
+        stacks="".join(f"  {_listed(leaf)},\n" for leaf in around.stacks),
         rectangle=printer.spelled("\n".join(real_time.RECTANGLE.values())),
     )
+
+
+def _listed(leaf: real_time.Leaf) -> str:
+    """A stack in JavaScript, with its functions."""
+    parts = ", ".join(f"[{part.side}, {part.energy}, [{', '.join(part.blurs)}]]" for part in leaf.parts)
+    return f"[{json.dumps(leaf.rows)}, [{parts}]]"
 
 
 _MODULE = """\
@@ -108,22 +114,25 @@ const valueOf = wgslFn(
   [model],
 );
 
-/** The parts: their share, the side that they leave on, and rows of texels, of the energy and of blurs. */
-const parts = [
-{parts}];
+/** The stacks: rows of texels; of each part the side that it leaves on, its energy and its blurs by these texels. */
+const stacks = [
+{stacks}];
 
 /** The sum of the parts, by the light that each blur sees: a node of its ray, whose last component is a roughness. */
 function seen(wi, blurred) {{
   const place = placeOf({{ wi }}).toVar(), sum = vec3(0).toVar();
   const {{ width, height }} = textures.vt_parts.value.image, size = vec2(width, height);
   const texel = (rows) => textures.vt_parts.sample(at({{ rows: vec4(...rows), place }}).div(size)).level(0);
-  for (const [share, side, energy, blurs] of parts) {{
-    const light = vec3(0).toVar();
-    for (const rows of blurs) {{
-      const blur = texel(rows).toVar(), ray = rayOf({{ blur, wi, side: float(side) }}).toVar();
-      light.addAssign(blurred(ray).mul(blur.w));
+  for (const [rows, parts] of stacks) {{
+    const given = Object.fromEntries(rows.map((row, k) => [`t${{k}}`, texel(row).toVar()]));
+    for (const [side, energy, blurs] of parts) {{
+      const light = vec3(0).toVar();
+      for (const each of blurs) {{
+        const blur = wgslFn(each)(given).toVar(), ray = rayOf({{ blur, wi, side: float(side) }}).toVar();
+        light.addAssign(blurred(ray).mul(blur.w));
+      }}
+      sum.addAssign(wgslFn(energy)(given).rgb.max(0).mul(light));
     }}
-    sum.addAssign(texel(energy).rgb.mul(light, share));
   }}
   return sum;
 }}

@@ -9,6 +9,8 @@ likelihood does, for which a tail is all. `fitted` runs for all nodes at once, b
 
 from __future__ import annotations
 
+from collections.abc import Collection
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -73,7 +75,9 @@ def alpha_of(variance: Array) -> Array:
     return np.interp(variance, VARIANCES, ALPHAS)
 
 
-def fitted(start: Array, sine: Array, w: Array, ratio: Array, sampled: Array, fixed: bool = False) -> Array:
+def fitted(
+    start: Array, sine: Array, w: Array, ratio: Array, sampled: Array, kept: Collection[int] = ()
+) -> Array:
     """Blurs (nodes, K, 4): across the normal, in the plane of incidence and beside it, beyond the mirror's direction;
     the root of alpha; the share.
 
@@ -83,13 +87,13 @@ def fitted(start: Array, sine: Array, w: Array, ratio: Array, sampled: Array, fi
         w: directions (3, nodes, samples), in the plane of incidence, upwards.
         ratio: the distribution's density there over that of samples.
         sampled: the density of samples.
-        fixed: leave alphas as they are.
+        kept: which of the four numbers stay as they begin.
     """
     nodes, count, _ = start.shape
     root = np.sqrt(ratio / ratio.shape[1])
     drawn = sampled > 0
     per = np.where(drawn, 1 / np.sqrt(np.where(drawn, sampled, 1) * ratio.shape[1]), 0)
-    free = [k for k in range(4 * count) if not (fixed and k % 4 == 2)]
+    free = [k for k in range(4 * count) if k % 4 not in kept]
 
     def bounded(x: Array) -> Array:
         blurs = start.copy()

@@ -34,6 +34,7 @@ SAMPLES = 1024  # of a part at a node, of which a plane's blurs are fitted to a 
 FAINT = 1e-4  # energy, below which a part is left out
 MOST = {LINE: 4, PLANE: 6}  # blurs, but one at least for each part
 NEAR = 0.005  # distance times energy and alpha, from which a part gets no further blur
+LOSS = 0.015  # of light, the most that a number of a part may misplace where it is a sum of few
 
 
 @dataclass(frozen=True)
@@ -118,14 +119,18 @@ class _Part:
     def blurs(self, count: int) -> tuple[Array, float]:
         """So many blurs (nodes, count, 4), and the mean over nodes of their distance times energy and alpha, since
         environments differ less over small angles."""
-        few = slice(None, None, 1 if len(self.sine) == LINE[0] else 4)
+        isotropic = len(self.sine) == LINE[0]
+        few = slice(None, None, 1 if isotropic else 4)
         w, ratio, density = self.w[..., few], self.ratio[:, few], self.density[:, few]
-        found = blurs.fitted(self._start(count), self.sine, w, ratio, density)
+        start, kept = self._start(count), set[int]()
+        if isotropic:
+            start[..., 1], kept = 0, {1}  # in the plane of incidence
+        found = blurs.fitted(start, self.sine, w, ratio, density, kept)
         if count > 1:
             # Each of one alpha from all directions, so that neighbours read the same level of a texture
             weight = self.energy.max(axis=-1)[:, None] * found[..., 3]
             found[..., 2] = (weight * found[..., 2]).sum(axis=0) / np.maximum(weight.sum(axis=0), 1e-12)
-            found = blurs.fitted(found, self.sine, w, ratio, density, fixed=True)
+            found = blurs.fitted(found, self.sine, w, ratio, density, kept | {2})
         distance = blurs.distance(found, self.sine, w, ratio, density)
         alpha = (found[..., 2] ** 2 * found[..., 3]).sum(axis=-1)
         return found, float(np.mean(distance * self.energy.max(axis=-1) * alpha))
@@ -153,12 +158,48 @@ class _Part:
         return np.stack(found, axis=1)
 
 
-def texture(found: Prefiltered) -> Array:
-    """Texels, float32 of shape (height, width, 4): a column for each cosine; for each side and part a line of its
-    energy and one for each blur, or such lines for each azimuth."""
-    cosines, turns = found.shape[0], prod(found.shape[1:])
-    sides = len(found.energy)
-    energy = np.pad(found.energy, ((0, 0), (0, 0), (0, 0), (0, 1)))
-    rows = np.concatenate([x for k, part in enumerate(found.blurs) for x in (energy[:, :, k : k + 1], part)], axis=2)
-    grid = rows.reshape(sides, cosines, turns, -1, 4)
-    return np.ascontiguousarray(grid.transpose(0, 3, 2, 1, 4), np.float32).reshape(-1, cosines, 4)
+@dataclass(frozen=True)
+class Sums:
+    """Numbers of parts over direction as sums of few, which are in a texture.
+
+    `texels` are of shape (T, sides, azimuths, cosines, 4), within -1 and 1. `factors` are of each part (1 + K, 4,
+    4 T + 1): of red, green, blue and 0, and of each blur's numbers, their factors of the components of all T texels,
+    and what is added.
+    """
+
+    texels: Array
+    factors: Sequence[Array]
+
+
+def summed(found: Prefiltered) -> Sums:
+    """The numbers of parts by their principal components, as few as leave them right within `LOSS`."""
+    groups = []
+    for k, part in enumerate(found.blurs):
+        energy = found.energy[:, :, k]
+        rows = np.concatenate([np.pad(energy, ((0, 0), (0, 0), (0, 1)))[:, :, None], part], axis=2)
+        groups.append((rows.reshape(-1, rows.shape[2], 4), _moved(energy, part)))
+    values = np.concatenate([rows.reshape(len(rows), -1) for rows, _ in groups], axis=1)
+    moved = np.concatenate([np.ravel(light) for _, light in groups])
+    mean = values.mean(axis=0)
+    left, size, right = np.linalg.svd((values - mean) * moved, full_matrices=False)
+    over = np.arange(len(size) + 1)
+    loss = [np.max(np.abs((left[:, n:] * size[n:]) @ right[n:]), initial=0) for n in over]
+    count = 4 * -(-max(int(np.argmax(np.array(loss) < LOSS)), 1) // 4)
+    scores = np.pad(left * size, ((0, 0), (0, count)))[:, :count]
+    scale = np.maximum(np.abs(scores).max(axis=0), 1e-12)
+    factors = np.pad(right, ((0, count), (0, 0)))[:count] * scale[:, None] / moved
+    sides, cosines, turns = len(found.energy), found.shape[0], prod(found.shape[1:])
+    texels = (scores / scale).reshape(sides, cosines, turns, -1, 4).transpose(3, 0, 2, 1, 4)
+    table = np.concatenate([factors, mean[None]]).T
+    ends = np.cumsum([rows.shape[1] for rows, _ in groups])
+    return Sums(texels, np.split(table.reshape(-1, 4, count + 1), ends[:-1]))
+
+
+def _moved(energy: Array, part: Array) -> Array:
+    """Light that a change by 1 displaces, at most, of each number of a part (1 + K, 4)."""
+    x, y, root, share = np.moveaxis(part, -1, 0)
+    light = energy.max(axis=-1)[..., None]
+    # Half the integral of the difference of densities of narrow blurs
+    place, width = light * share / (4 * root**2), light * share / root
+    moved = np.stack([place, place, width, light + 0 * share], axis=-1).max(axis=(0, 1))
+    return np.concatenate([np.ones((1, 4)), np.maximum(moved, 1e-6)])
