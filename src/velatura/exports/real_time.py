@@ -12,6 +12,7 @@ import re
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
+from math import cos, sin
 from typing import NamedTuple
 
 import numpy as np
@@ -52,8 +53,10 @@ class Part(NamedTuple):
 
 
 class Leaf(NamedTuple):
-    """A stack: the rows of its texels, and its parts, whose functions take these texels."""
+    """A stack: cosine and sine of where its azimuths begin, the rows of its texels, and its parts, whose functions take
+    these texels."""
 
+    axis: Sequence[float]
     rows: Sequence[Row]
     parts: Sequence[Part]
 
@@ -147,18 +150,20 @@ def lit(request: Request, printer: CLike) -> Lit:
 def environment(request: Request) -> Environment:
     """The light of a material without textures by an engine's environment."""
     leaves = zip(shares(request.material), request.material.leaves())
-    parts = [
-        (share, prefiltered.prefiltered(Material.of(leaf), request.model)) for share, (_, leaf) in leaves if share
-    ]
+    parts = [(share, prefiltered.prefiltered(Material.of(leaf), request.model)) for share, (_, leaf) in leaves if share]
     azimuths = any(len(found.shape) > 1 for _, found in parts)
-    functions = {"vt_place": _PLACE.format(azimuth=_AZIMUTH if azimuths else "    float azimuth = 0.0;\n"), "vt_at": _AT}
+    functions = {
+        "vt_place": _PLACE.format(azimuth=_AZIMUTH if azimuths else "    float azimuth = 0.0;\n"),
+        "vt_at": _AT,
+    }
     widest = max(found.shape[0] for _, found in parts)
     stacks, texels, first = list[Leaf](), [], 0
     for share, found in parts:
         sums = prefiltered.summed(found)
         count, sides, turns, cosines, _ = sums.texels.shape
         rows = [Row(cosines - 1, turns - 1, turns * (sides - 1), first + turns * sides * k) for k in range(count)]
-        stacks.append(Leaf(rows, list(_parts(share, found, sums, functions))))
+        axis = [round(f(found.turn), 7) + 0.0 for f in (cos, sin)]
+        stacks.append(Leaf(axis, rows, list(_parts(share, found, sums, functions))))
         own = sums.texels.reshape(-1, cosines, 4)
         texels.append(np.pad(own, ((0, 0), (0, widest - cosines), (0, 0))))
         first += len(own)
@@ -192,7 +197,8 @@ def _sum(name: str, factors: np.ndarray) -> str:
 
 def _statement(leaf: Leaf) -> str:
     """A statement of GLSL that adds a stack."""
-    lines, texels = list[str](), ", ".join(f"t{k}" for k in range(len(leaf.rows)))
+    lines = [f"vec3 place = vt_place(wi, vec2({', '.join(map(str, leaf.axis))}));"]
+    texels = ", ".join(f"t{k}" for k in range(len(leaf.rows)))
     for k, row in enumerate(leaf.rows):
         lines.append(f"vec4 t{k} = vt_texel(vt_at(vec4({', '.join(f'{x}.0' for x in row)}), place));")
     for part in leaf.parts:
@@ -290,7 +296,6 @@ vec3 vt_light(vec4 blur, vec3 wi, float side) {{
 
 // Light from wi by the environment that vt_blurred gives
 vec3 vt_environment(vec3 wi) {{
-    vec3 place = vt_place(wi);
     vec3 sum = vec3(0.0);
 {stacks}
     return sum;
@@ -298,14 +303,15 @@ vec3 vt_environment(vec3 wi) {{
 """
 
 _PLACE = """\
-// Where parts for light from wi lie: over the cosine, over the azimuth, and whether from below
-vec3 vt_place(vec3 wi) {{
+// Where parts for light from wi lie: over the cosine, over the azimuth from an axis, and whether from below
+vec3 vt_place(vec3 wi, vec2 axis) {{
 {azimuth}    return vec3(sqrt(abs(wi.z)), azimuth, 1.0 - step(0.0, wi.z));
 }}
 """
 
 _AZIMUTH = """\
-    vec2 twice = vec2(wi.x * wi.x - wi.y * wi.y + 1e-15, 2.0 * wi.x * wi.y);
+    vec2 turned = vec2(dot(axis, wi.xy), axis.x * wi.y - axis.y * wi.x);
+    vec2 twice = vec2(turned.x * turned.x - turned.y * turned.y + 1e-15, 2.0 * turned.x * turned.y);
     float along = twice.x / (abs(twice.x) + abs(twice.y));
     float azimuth = 0.25 * mix(3.0 + along, 1.0 - along, step(0.0, twice.y));
 """

@@ -53,7 +53,7 @@ def write(request: Request) -> Export:
 def _listed(leaf: real_time.Leaf) -> str:
     """A stack in JavaScript, with its functions."""
     parts = ", ".join(f"[{part.side}, {part.energy}, [{', '.join(part.blurs)}]]" for part in leaf.parts)
-    return f"[{json.dumps(leaf.rows)}, [{parts}]]"
+    return f"[{json.dumps(leaf.axis)}, {json.dumps(leaf.rows)}, [{parts}]]"
 
 
 _MODULE = """\
@@ -114,16 +114,20 @@ const valueOf = wgslFn(
   [model],
 );
 
-/** The stacks: rows of texels; of each part the side that it leaves on, its energy and its blurs by these texels. */
+/**
+ * The stacks: where azimuths begin; rows of texels; of each part the side that it leaves on, its energy and its blurs,
+ * by these texels.
+ */
 const stacks = [
 {stacks}];
 
 /** The sum of the parts, by the light that each blur sees: a node of its ray, whose last component is a roughness. */
 function seen(wi, blurred) {{
-  const place = placeOf({{ wi }}).toVar(), sum = vec3(0).toVar();
+  const sum = vec3(0).toVar();
   const {{ width, height }} = textures.vt_parts.value.image, size = vec2(width, height);
-  const texel = (rows) => textures.vt_parts.sample(at({{ rows: vec4(...rows), place }}).div(size)).level(0);
-  for (const [rows, parts] of stacks) {{
+  for (const [axis, rows, parts] of stacks) {{
+    const place = placeOf({{ wi, axis: vec2(...axis) }}).toVar();
+    const texel = (row) => textures.vt_parts.sample(at({{ rows: vec4(...row), place }}).div(size)).level(0);
     const given = Object.fromEntries(rows.map((row, k) => [`t${{k}}`, texel(row).toVar()]));
     for (const [side, energy, blurs] of parts) {{
       const light = vec3(0).toVar();

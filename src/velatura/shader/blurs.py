@@ -75,9 +75,7 @@ def alpha_of(variance: Array) -> Array:
     return np.interp(variance, VARIANCES, ALPHAS)
 
 
-def fitted(
-    start: Array, sine: Array, w: Array, ratio: Array, sampled: Array, kept: Collection[int] = ()
-) -> Array:
+def fitted(start: Array, sine: Array, w: Array, ratio: Array, sampled: Array, kept: Collection[int] = ()) -> Array:
     """Blurs (nodes, K, 4): across the normal, in the plane of incidence and beside it, beyond the mirror's direction;
     the root of alpha; the share.
 

@@ -1,16 +1,18 @@
 """The light of a material by prefiltered environments: for light from each direction, every part's energy, and the
 blurs of the environment that stand for the part.
 
-A part is the light of one interface, the remainder, or what passes. Its blurs are those of `velatura.shader.blurs`,
-each about a direction of its own, which is bent from the mirror's. Parts share as many of them as a frame can afford;
-they go where they bring most.
+A part is the light of one interface or of more that leave alike, the remainder, or what passes. Its blurs are those of
+`velatura.shader.blurs`, each about a direction of its own, which is bent from the mirror's. Parts share as many of them
+as a frame can afford; they go where they bring most. Numbers of all parts are sums of a few over direction, so that a
+frame reads few texels.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from math import prod
+from math import prod, radians
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,6 +20,7 @@ from numpy.typing import NDArray
 from velatura.model import Model, variance_kind
 from velatura.model.base import Body, Query
 from velatura.model.context import Context
+from velatura.model.guards import ALPHA_MIN
 from velatura.model.variance import Isotropic
 from velatura.optics.ggx import Direction
 from velatura.optics.phase import tangents
@@ -32,8 +35,9 @@ LINE, PLANE = (64,), (32, 17)  # nodes over the cosine, and the azimuth where an
 COS_MIN, COS_MAX = 0.02, 1 - 1e-6  # of directions at nodes, which all have an azimuth
 SAMPLES = 1024  # of a part at a node, of which a plane's blurs are fitted to a quarter
 FAINT = 1e-4  # energy, below which a part is left out
-MOST = {LINE: 4, PLANE: 6}  # blurs, but one at least for each part
+MOST = {LINE: 4, PLANE: 3}  # blurs, less one where both sides are seen, but one at least for each part
 NEAR = 0.005  # distance times energy and alpha, from which a part gets no further blur
+CLOSE = 0.003  # the same, by which one blur for two parts may be farther off than one for each
 LOSS = 0.015  # of light, the most that a number of a part may misplace where it is a sum of few
 
 
@@ -41,64 +45,133 @@ LOSS = 0.015  # of light, the most that a number of a part may misplace where it
 class Prefiltered:
     """Parts over direction, from above and, where the material transmits, from below: their energies
     (sides, nodes, parts, 3), and of each part its blurs (sides, nodes, K, 4), as `blurs.fitted` returns them. `passes`
-    says which parts leave on the other side.
+    says which parts leave on the other side, and `turn` from where azimuths count, in radians.
     """
 
     energy: Array
     blurs: Sequence[Array]
     shape: tuple[int, ...]
     passes: Sequence[bool]
+    turn: float
 
 
 def prefiltered(material: Material, model: Model) -> Prefiltered:
     """The parts of a material with values in NumPy: every interface's light, the remainder, and what passes."""
     isotropic = variance_kind(material) is Isotropic
     shape = LINE if isotropic else PLANE
-    x, y, z = (np.ravel(w) for w in directional_grid.directions(shape, None))
+    turn = 0.0 if isotropic else _across(material)
+    x, y, z = directional_grid.directions(shape, None)
+    twice = np.arctan2(2 * x * y, x * x - y * y).reshape(shape[0], -1)
+    phi = np.ravel(0.5 * np.unwrap(twice))  # up to half a turn, and that itself
     z = np.clip(z, COS_MIN, COS_MAX)
-    scale = np.sqrt((1 - z * z) / (x * x + y * y))
+    sine = np.sqrt(1 - z * z)
+    x, y = sine * np.cos(turn + phi), sine * np.sin(turn + phi)
     body = model.body(material, variance_kind(material), Context())
-    count = len(model.statistics(material, (x[:1] * scale[:1], y[:1] * scale[:1], z[:1])).energy)
-    reflected = [Query([k == j for j in range(count + 1)], False) for k in range(count + 1)]
-    asked = [*reflected, *([Query(False, True, radiance=False)] if material.transmits else [])]
+    count = len(model.statistics(material, (x[:1], y[:1], z[:1])).energy)
     sides = [1.0, -1.0] if material.transmits else [1.0]
-    parts = [[_Part.of(body, (x * scale, y * scale, side * z), each) for side in sides] for each in asked]
-    kept = [k for k, part in enumerate(parts) if max(np.max(side.energy) for side in part) > FAINT] or [0]
-    found = _shared([parts[k] for k in kept], MOST[shape])
-    energy = np.stack([np.stack([side.energy for side in parts[k]]) for k in kept], axis=2)
-    return Prefiltered(energy, found, shape, [bool(asked[k].transmission) for k in kept])
+
+    def of(lobes: frozenset[int]) -> _Light:
+        reflected = Query([k in lobes for k in range(count + 1)], False)
+        asked = reflected if lobes else Query(False, True, radiance=False)
+        return _Light(lobes, [_Part.of(body, (x, y, side * z), phi, asked) for side in sides])
+
+    reflected = [of(frozenset([k])) for k in range(count + 1)]
+    passed = [of(frozenset())] if material.transmits else []
+    kept = [*_joined([each for each in reflected if each.energy > FAINT], of)]
+    kept = [*kept, *(each for each in passed if each.energy > FAINT)] or reflected[:1]
+    energy = np.stack([np.stack([side.energy for side in each.sides]) for each in kept], axis=2)
+    found = _shared(kept, MOST[shape] + 1 - len(sides))
+    return Prefiltered(energy, found, shape, [not each.lobes for each in kept], turn)
 
 
-def _shared(parts: Sequence[Sequence[_Part]], most: int) -> list[Array]:
-    """The blurs of parts from each side: one each, and further ones where the distance is largest."""
+def _across(material: Material) -> float:
+    """The azimuth across the grooves that are longest for their width, where lobes are shortest, in radians."""
 
-    def of(part: Sequence[_Part], count: int) -> tuple[Array, float]:
-        found = [side.blurs(count) for side in part]
-        return np.stack([x for x, _ in found]), max(distance for _, distance in found)
+    def ratio(interface: Any) -> float:
+        narrow, wide = sorted([float(interface.alpha_u), float(interface.alpha_v)])
+        return (wide + ALPHA_MIN) / (narrow + ALPHA_MIN)
 
-    found = [of(part, 1) for part in parts]
-    for _ in range(most - len(parts)):
-        worst = int(np.argmax([distance for _, distance in found]))
-        if found[worst][1] < NEAR:
+    interface = max(material.interfaces, key=ratio)
+    return radians(float(interface.rotation) + (90 if interface.alpha_u > interface.alpha_v else 0))
+
+
+def _joined(lights: Sequence[_Light], of: Callable[[frozenset[int]], _Light]) -> Sequence[_Light]:
+    """Light of lobes, of which the faintest joins others as long as one blur is nearly as good for both."""
+
+    def farther(one: _Light, other: _Light, both: _Light) -> float:
+        found = [each.blurs(1) for each in (both, one, other)]
+        widths = np.maximum(_alphas(found[1]), _alphas(found[2]))
+        missed = [each.missed(blurs, widths) for each, blurs in zip((both, one, other), found)]
+        return missed[0] - missed[1] - missed[2]
+
+    while len(lights) > 1:
+        faint, *others = sorted(lights, key=lambda light: light.energy)
+        tried = [of(each.lobes | faint.lobes) for each in others]
+        found = [farther(each, faint, both) for each, both in zip(others, tried)]
+        best = int(np.argmin(found))
+        if found[best] > CLOSE:
             break
-        found[worst] = of(parts[worst], found[worst][0].shape[2] + 1)
-    return [x for x, _ in found]
+        lights = [*others[:best], tried[best], *others[best + 1 :]]
+    return sorted(lights, key=lambda light: min(light.lobes))
+
+
+def _shared(lights: Sequence[_Light], most: int) -> list[Array]:
+    """The blurs of each: one, and further ones where most is missed."""
+    found = [light.blurs(1) for light in lights]
+    for _ in range(most - len(lights)):
+        missed = [light.missed(blurs, _alphas(blurs)) for light, blurs in zip(lights, found)]
+        worst = int(np.argmax(missed))
+        if missed[worst] < NEAR:
+            break
+        found[worst] = lights[worst].blurs(found[worst].shape[2] + 1)
+    return found
+
+
+def _alphas(found: Array) -> Array:
+    """Mean alphas of blurs (..., K, 4)."""
+    return np.asarray((found[..., 2] ** 2 * found[..., 3]).sum(axis=-1))
+
+
+@dataclass(frozen=True)
+class _Light:
+    """A part: the lobes that it is of, or none where it passes; seen from above and, where the material transmits, from
+    below."""
+
+    lobes: frozenset[int]
+    sides: Sequence[_Part]
+
+    @property
+    def energy(self) -> float:
+        """The most of its energy."""
+        return max(float(np.max(side.energy)) for side in self.sides)
+
+    def blurs(self, count: int) -> Array:
+        """So many blurs (sides, nodes, count, 4)."""
+        return np.stack([side.blurs(count) for side in self.sides])
+
+    def missed(self, found: Array, widths: Array) -> float:
+        """The mean over nodes of the distance of blurs times energy and alphas (sides, nodes), since environments
+        differ less over small angles; the most of both sides."""
+        return max(
+            float(np.mean(side.distances(blurs) * width)) for side, blurs, width in zip(self.sides, found, widths)
+        )
 
 
 @dataclass(frozen=True)
 class _Part:
     """Samples of a part on one side of the surface, for light from nodes: energies (nodes, 3); the sine of their
-    direction; directions (3, nodes, samples), in the plane of incidence, upwards; densities over those of samples,
-    which are last, 0 on the other side."""
+    direction; azimuths, from where lobes are shortest; directions (3, nodes, samples), in the plane of incidence,
+    upwards; densities over those of samples, which are last, 0 on the other side."""
 
     energy: Array
     sine: Array
+    phi: Array
     w: Array
     ratio: Array
     density: Array
 
     @classmethod
-    def of(cls, body: Body, wi: Direction, asked: Query) -> _Part:
+    def of(cls, body: Body, wi: Direction, phi: Array, asked: Query) -> _Part:
         nodes = len(wi[0])
         u = at_nodes(nodes, SAMPLES)
         repeat = tuple(repeated(x, SAMPLES) for x in wi)
@@ -114,16 +187,13 @@ class _Part:
         up = np.sign(wi[2])[:, None] * (-1 if asked.transmission else 1) * w[2]
         w = np.stack([c * w[0] + s * w[1], c * w[1] - s * w[0], np.abs(up)])
         density = np.where(up > 0, np.broadcast_to(density, nodes * SAMPLES).reshape(nodes, SAMPLES), 0)
-        return cls(weight.mean(axis=-1).T, sine, w, ratio, density)
+        return cls(weight.mean(axis=-1).T, sine, phi, w, ratio, density)
 
-    def blurs(self, count: int) -> tuple[Array, float]:
-        """So many blurs (nodes, count, 4), and the mean over nodes of their distance times energy and alpha, since
-        environments differ less over small angles."""
-        isotropic = len(self.sine) == LINE[0]
-        few = slice(None, None, 1 if isotropic else 4)
-        w, ratio, density = self.w[..., few], self.ratio[:, few], self.density[:, few]
+    def blurs(self, count: int) -> Array:
+        """So many blurs (nodes, count, 4)."""
+        w, ratio, density = self._few
         start, kept = self._start(count), set[int]()
-        if isotropic:
+        if self._isotropic:
             start[..., 1], kept = 0, {1}  # in the plane of incidence
         found = blurs.fitted(start, self.sine, w, ratio, density, kept)
         if count > 1:
@@ -131,9 +201,22 @@ class _Part:
             weight = self.energy.max(axis=-1)[:, None] * found[..., 3]
             found[..., 2] = (weight * found[..., 2]).sum(axis=0) / np.maximum(weight.sum(axis=0), 1e-12)
             found = blurs.fitted(found, self.sine, w, ratio, density, kept | {2})
-        distance = blurs.distance(found, self.sine, w, ratio, density)
-        alpha = (found[..., 2] ** 2 * found[..., 3]).sum(axis=-1)
-        return found, float(np.mean(distance * self.energy.max(axis=-1) * alpha))
+        return found
+
+    def distances(self, found: Array) -> Array:
+        """Distances of blurs (nodes, K, 4) times energies, at nodes."""
+        w, ratio, density = self._few
+        return blurs.distance(found, self.sine, w, ratio, density) * self.energy.max(axis=-1)
+
+    @property
+    def _isotropic(self) -> bool:
+        return len(self.sine) == LINE[0]
+
+    @property
+    def _few(self) -> tuple[Array, Array, Array]:
+        """The directions, ratios and densities that blurs are fitted to."""
+        few = slice(None, None, 1 if self._isotropic else 4)
+        return self.w[..., few], self.ratio[:, few], self.density[:, few]
 
     def _start(self, count: int) -> Array:
         """Blurs side by side along the longer axis, the narrower ones first."""
@@ -147,6 +230,9 @@ class _Part:
         xx, xy, yy = ((along[a] * along[b] * share).sum(axis=-1) for a, b in ((0, 0), (0, 1), (1, 1)))
         more = np.hypot(0.5 * (xx - yy), xy)
         angle = 0.5 * np.arctan2(xy, 0.5 * (xx - yy))
+        # An axis has two; this one varies smoothly over half a turn, where those that lobes are longest along do
+        near = 0.5 * (0.5 * np.pi - self.phi)
+        angle += np.pi * np.round((near - angle) / np.pi)
         axis = np.cos(angle) * across[0] + np.sin(angle) * across[1]
         root = np.sqrt(blurs.alpha_of(np.maximum(0.5 * (xx + yy) - more, 0)))
         found = []
@@ -197,7 +283,7 @@ def summed(found: Prefiltered) -> Sums:
 
 def _moved(energy: Array, part: Array) -> Array:
     """Light that a change by 1 displaces, at most, of each number of a part (1 + K, 4)."""
-    x, y, root, share = np.moveaxis(part, -1, 0)
+    root, share = part[..., 2], part[..., 3]
     light = energy.max(axis=-1)[..., None]
     # Half the integral of the difference of densities of narrow blurs
     place, width = light * share / (4 * root**2), light * share / root
