@@ -2,8 +2,8 @@
 
 A page in headless Chromium, on the processor (SwiftShader), draws four balls under a prefiltered environment by one
 material after the other, round by round. Prints, for each preset, the processor time of the browser's processes over
-that by the engine's own material in the same round: plain, and with the clearcoat and anisotropy that such presets need
-there. Needs psutil.
+that by the engine's own material in the same round: plain; with the clearcoat and anisotropy, or the transmission, that
+such presets need there; and seen from both sides, as glass is, where SwiftShader shades hidden ones too. Needs psutil.
 
     python benchmarks/frames.py [--presets bare-gold,coated-gold,...] [--rounds 9] [--frames 4] [--size 440]
 """
@@ -26,6 +26,8 @@ import in_three
 import velatura as vt
 
 PRESETS = "bare-gold,car-paint,varnished-paint,wet-copper,anodised-titanium,coated-gold,frosted-glass"
+
+OWN = ("clearcoat and anisotropy", "both sides", "transmission", "transmission, both sides")  # as the page has them
 
 STAGE = """
 async (job) => {
@@ -51,6 +53,9 @@ async (job) => {
     new THREE.MeshPhysicalMaterial({
       color: 0xffc070, metalness: 1, roughness: 0.4, clearcoat: 1, clearcoatRoughness: 0.2, anisotropy: 0.5,
     }),
+    new THREE.MeshPhysicalMaterial({ metalness: 1, roughness: 0.4, side: THREE.DoubleSide }),
+    new THREE.MeshPhysicalMaterial({ roughness: 0.4, transmission: 1 }),
+    new THREE.MeshPhysicalMaterial({ roughness: 0.4, transmission: 1, side: THREE.DoubleSide }),
   ];
   for (const module of job.modules) materials.push(new (await import(module)).LayeredMaterial());
   const gl = renderer.getContext(), pixel = new Uint8Array(4);
@@ -66,15 +71,15 @@ async (job) => {
 
 
 def times(page: Any, modules: list[str], rounds: int, frames: int, size: int) -> np.ndarray:
-    """Processor time of frames in milliseconds, of the engine's two materials and of the modules; (2 + modules,
-    rounds)."""
+    """Processor time of frames in milliseconds, of the engine's own material, plain and as `OWN` has it, and of the
+    modules; (materials, rounds)."""
     page.evaluate(STAGE, {"modules": modules, "size": size})
     processes = psutil.Process().children(recursive=True)
 
     def spent() -> float:
         return sum(sum(process.cpu_times()[:2]) for process in processes)
 
-    found = np.zeros((2 + len(modules), rounds))
+    found = np.zeros((1 + len(OWN) + len(modules), rounds))
     for turn in range(-1, rounds):
         for k in range(len(found)):
             before = spent()
@@ -93,9 +98,9 @@ def main() -> None:
     with in_three.stage() as stage:
         stage.files.update({f"{preset}.js": vt.export(preset, "three").text for preset in presets})
         modules = [f"/{preset}.js" for preset in presets]
-        plain, coated, *ours = times(stage.page, modules, options.rounds, options.frames, options.size)
+        plain, *others = times(stage.page, modules, options.rounds, options.frames, options.size)
     row("frames", "MeshPhysicalMaterial", plain.tolist(), "ms")
-    for name, found in [("the same, clearcoat and anisotropy", coated), *zip(presets, ours)]:
+    for name, found in zip([*(f"the same, {each}" for each in OWN), *presets], others):
         row("frames", name, (found / plain).tolist(), "of a frame")
 
 

@@ -167,7 +167,7 @@ def environment(request: Request) -> Environment:
         own = sums.texels.reshape(-1, cosines, 4)
         texels.append(np.pad(own, ((0, 0), (0, widest - cosines), (0, 0))))
         first += len(own)
-    functions["vt_ray"] = _RAY
+    functions |= {"vt_plane": _INCIDENCE, "vt_ray": _RAY}
     text = _ENVIRONMENT.format(functions="\n".join(functions.values()), stacks="\n".join(map(_statement, stacks)))
     return Environment(text, functions, stacks, np.concatenate(texels))
 
@@ -184,15 +184,23 @@ def _parts(share: float, found: Prefiltered, sums: Sums, functions: dict[str, st
 
 def _sum(name: str, factors: np.ndarray) -> str:
     """A function of GLSL that gives four numbers by texels; their factors (4, 4 T + 1)."""
-    texels = [f"t{k}" for k in range(factors.shape[1] // 4)]
+    *of_texels, added = np.split(np.round(factors, 9) + 0.0, range(4, factors.shape[1], 4), axis=1)
 
-    def listed(values: np.ndarray) -> str:
-        return ", ".join(f"{x:.6g}" for x in np.round(np.ravel(values), 9) + 0.0)
+    def number(k: int) -> str:
+        terms = [
+            f"dot(vec4({', '.join(map(_float, own[k]))}), t{texel})"
+            for texel, own in enumerate(of_texels)
+            if own[k].any()
+        ]
+        return " + ".join([*terms, _float(added[k, 0])])
 
-    terms = [f"mat4({listed(factors[:, 4 * k : 4 * k + 4].T)}) * {texel}" for k, texel in enumerate(texels)]
-    arguments = ", ".join(f"vec4 {texel}" for texel in texels)
-    value = "\n        + ".join([*terms, f"vec4({listed(factors[:, -1])})"])
-    return f"vec4 {name}({arguments}) {{\n    return {value};\n}}\n"
+    arguments = ", ".join(f"vec4 t{texel}" for texel in range(len(of_texels)))
+    value = ",\n        ".join(map(number, range(4)))
+    return f"vec4 {name}({arguments}) {{\n    return vec4(\n        {value});\n}}\n"
+
+
+def _float(x: float) -> str:
+    return repr(float(f"{x:.6g}"))
 
 
 def _statement(leaf: Leaf) -> str:
@@ -202,7 +210,7 @@ def _statement(leaf: Leaf) -> str:
     for k, row in enumerate(leaf.rows):
         lines.append(f"vec4 t{k} = vt_texel(vt_at(vec4({', '.join(f'{x}.0' for x in row)}), place));")
     for part in leaf.parts:
-        seen = " + ".join(f"vt_light({blur}({texels}), wi, {part.side}.0)" for blur in part.blurs)
+        seen = " + ".join(f"vt_light({blur}({texels}), wi, plane, {part.side}.0)" for blur in part.blurs)
         lines.append(f"sum += max({part.energy}({texels}).rgb, 0.0) * ({seen});")
     return "\n".join(["    {", *(f"        {line}" for line in lines), "    }"])
 
@@ -289,13 +297,14 @@ vec4 vt_texel(vec2 texel) {{
 }}
 
 {functions}
-vec3 vt_light(vec4 blur, vec3 wi, float side) {{
-    vec4 ray = vt_ray(blur, wi, side);
+vec3 vt_light(vec4 blur, vec3 wi, vec2 plane, float side) {{
+    vec4 ray = vt_ray(blur, wi, plane, side);
     return blur.w * vt_blurred(ray.xyz, ray.w);
 }}
 
 // Light from wi by the environment that vt_blurred gives
 vec3 vt_environment(vec3 wi) {{
+    vec2 plane = vt_plane(wi);
     vec3 sum = vec3(0.0);
 {stacks}
     return sum;
@@ -323,11 +332,17 @@ vec2 vt_at(vec4 rows, vec3 place) {
 }
 """
 
+_INCIDENCE = """\
+// The direction of the plane of incidence along the surface
+vec2 vt_plane(vec3 wi) {
+    float sine2 = dot(wi.xy, wi.xy);
+    return mix(vec2(1.0, 0.0), wi.xy / sqrt(max(sine2, 1e-12)), step(1e-12, sine2));
+}
+"""
+
 _RAY = """\
 // The direction that a blur sees, on a side of the view's, and the root of alpha
-vec4 vt_ray(vec4 blur, vec3 wi, float side) {
-    float sine2 = dot(wi.xy, wi.xy);
-    vec2 plane = mix(vec2(1.0, 0.0), wi.xy / sqrt(max(sine2, 1e-12)), step(1e-12, sine2));
+vec4 vt_ray(vec4 blur, vec3 wi, vec2 plane, float side) {
     vec2 across = vec2(plane.x * blur.x - plane.y * blur.y, plane.y * blur.x + plane.x * blur.y) - wi.xy;
     float up = sqrt(max(1.0 - dot(across, across), 0.0));
     return vec4(across, side * sign(wi.z) * up, blur.z);

@@ -100,7 +100,8 @@ const rectangleOf = wgslFn(
   }}`,
   [wgsl(vt_rectangle)],
 );
-const frameOf = wgslFn(vt_frame_of), placeOf = wgslFn(vt_place), at = wgslFn(vt_at), rayOf = wgslFn(vt_ray);
+const frameOf = wgslFn(vt_frame_of), placeOf = wgslFn(vt_place), at = wgslFn(vt_at);
+const planeOf = wgslFn(vt_plane), rayOf = wgslFn(vt_ray);
 const lobesOf = wgslFn(
   `fn vt_lobes_at({declared}uv: vec2f, wi: vec3f) -> VtLobes {{
     return {lobes};
@@ -123,7 +124,7 @@ const stacks = [
 
 /** The sum of the parts, by the light that each blur sees: a node of its ray, whose last component is a roughness. */
 function seen(wi, blurred) {{
-  const sum = vec3(0).toVar();
+  const plane = planeOf({{ wi }}).toVar(), sum = vec3(0).toVar();
   const {{ width, height }} = textures.vt_parts.value.image, size = vec2(width, height);
   for (const [axis, rows, parts] of stacks) {{
     const place = placeOf({{ wi, axis: vec2(...axis) }}).toVar();
@@ -132,7 +133,7 @@ function seen(wi, blurred) {{
     for (const [side, energy, blurs] of parts) {{
       const light = vec3(0).toVar();
       for (const each of blurs) {{
-        const blur = wgslFn(each)(given).toVar(), ray = rayOf({{ blur, wi, side: float(side) }}).toVar();
+        const blur = wgslFn(each)(given).toVar(), ray = rayOf({{ blur, wi, plane, side: float(side) }}).toVar();
         light.addAssign(blurred(ray).mul(blur.w));
       }}
       sum.addAssign(wgslFn(energy)(given).rgb.max(0).mul(light));

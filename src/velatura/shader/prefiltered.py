@@ -35,7 +35,7 @@ LINE, PLANE = (64,), (32, 17)  # nodes over the cosine, and the azimuth where an
 COS_MIN, COS_MAX = 0.02, 1 - 1e-6  # of directions at nodes, which all have an azimuth
 SAMPLES = 1024  # of a part at a node, of which a plane's blurs are fitted to a quarter
 FAINT = 1e-4  # energy, below which a part is left out
-MOST = {LINE: 4, PLANE: 3}  # blurs, less one where both sides are seen, but one at least for each part
+MOST = 3  # blurs, but one at least for each part
 NEAR = 0.005  # distance times energy and alpha, from which a part gets no further blur
 CLOSE = 0.003  # the same, by which one blur for two parts may be farther off than one for each
 LOSS = 0.015  # of light, the most that a number of a part may misplace where it is a sum of few
@@ -80,8 +80,7 @@ def prefiltered(material: Material, model: Model) -> Prefiltered:
     kept = [*_joined([each for each in reflected if each.energy > FAINT], of)]
     kept = [*kept, *(each for each in passed if each.energy > FAINT)] or reflected[:1]
     energy = np.stack([np.stack([side.energy for side in each.sides]) for each in kept], axis=2)
-    found = _shared(kept, MOST[shape] + 1 - len(sides))
-    return Prefiltered(energy, found, shape, [not each.lobes for each in kept], turn)
+    return Prefiltered(energy, _shared(kept), shape, [not each.lobes for each in kept], turn)
 
 
 def _across(material: Material) -> float:
@@ -115,10 +114,10 @@ def _joined(lights: Sequence[_Light], of: Callable[[frozenset[int]], _Light]) ->
     return sorted(lights, key=lambda light: min(light.lobes))
 
 
-def _shared(lights: Sequence[_Light], most: int) -> list[Array]:
+def _shared(lights: Sequence[_Light]) -> list[Array]:
     """The blurs of each: one, and further ones where most is missed."""
     found = [light.blurs(1) for light in lights]
-    for _ in range(most - len(lights)):
+    for _ in range(MOST - len(lights)):
         missed = [light.missed(blurs, _alphas(blurs)) for light, blurs in zip(lights, found)]
         worst = int(np.argmax(missed))
         if missed[worst] < NEAR:

@@ -12,7 +12,7 @@ from velatura.shader.printers.c_like import SAMPLER, VALUES, CLike
 from velatura.shader.printers.printer import ATOM, Field
 from velatura.shader.recorder.symbol import LAYOUT, REMAINDER, SHOWN
 
-_TYPES = {"float": "f32", "int": "i32", "bvec3": "vec3<bool>", "mat3": "mat3x3f", "mat4": "mat4x4f"}
+_TYPES = {"float": "f32", "int": "i32", "bvec3": "vec3<bool>", "mat3": "mat3x3f"}
 _TYPES |= {f"{short}vec{n}": f"vec{n}{end}" for short, end in (("", "f"), ("i", "i")) for n in (2, 3, 4)}
 _WORDS = _TYPES | {"texelFetch": "textureLoad", "dFdx": "dpdx", "dFdy": "dpdy"}
 _WORD = re.compile(rf"\b({'|'.join(_WORDS)})\b")
