@@ -522,9 +522,8 @@ def test_a_material_is_checked_with_what_its_model_declares() -> None:
     assert progress[-1][0] == progress[-1][1]
 
 
-EVERYTHING = [
-    (model.name, form, name) for model in vt.MODELS for form in SWITCHES["form"] for name in vt.presets(mixtures=False)
-]
+SINGLE = vt.presets(mixtures=False)  # once, since all are read for it
+EVERYTHING = [(model.name, form, name) for model in vt.MODELS for form in SWITCHES["form"] for name in SINGLE]
 SLICE = [EVERYTHING[k] for k in np.random.default_rng(7).choice(len(EVERYTHING), 6, replace=False)]
 
 
