@@ -246,3 +246,44 @@ def test_a_lobe_of_three_interfaces_is_dragged(model: str) -> None:
     assert found.reached.lobes[0].colour[0] == pytest.approx(0.26, abs=1e-5)
     beyond = answer(triple, now.with_energy(0, (0.7,) * 3), chosen)
     assert not beyond.met and 0.38 < beyond.reached.lobes[0].colour[0] < 0.7
+
+
+def beyond(stack: Stack, form: list[dict[str, Any]], lobe: int, **wished: Any) -> tuple[Nearest, Nearest, Target]:
+    """Answers of the default model, under the hand and at rest, to a wish beyond all stacks, and the present lobes."""
+    model = named("velatura")
+    now = seen(stack, Target(form), model)
+    wish = now.with_lobe(lobe, **wished)
+    hand, rest = (answer(stack, wish, model, quick) for quick in (True, False))
+    return hand, rest, now
+
+
+def test_a_rough_stack_that_is_wished_far_rougher_has_the_same_bound_under_the_hand_and_at_rest() -> None:
+    """Two coats over a metal, whose second lobe is wished at an alpha of .9: what scatters above the metal ends it.
+
+    Expected: both bounds alike, and further than .172 of the way, where bisection ended; other lobes within .5 %.
+    """
+    metal = vt.Interface(eta=(1.9985, 2.0561, 2.0365), k=(2.7622, 2.8839, 2.8428), alpha=0.327)
+    coats = [vt.Interface(eta=1.2208, alpha=0.1165), vt.Medium(sigma_a=(0.0113, 0.0428, 0.0))]
+    second = [vt.Interface(eta=1.722, alpha=0.2144), vt.Medium(sigma_a=(0.1129, 0.2437, 0.2178))]
+    form: list[dict[str, Any]] = [{"energy": 0.1}, {"energy": 0.1}, {"energy": 0.1, "base": "conductor"}]
+    hand, rest, now = beyond(Stack([*coats, *second, metal]), form, 1, alpha=0.9)
+    assert not rest.met and not hand.met
+    assert hand.part == pytest.approx(rest.part, abs=0.02)
+    assert min(hand.part, rest.part) > 0.19
+    for found in (hand, rest):
+        for k in (0, 2):
+            assert found.reached.lobes[k].colour == pytest.approx(now.lobes[k].colour, rel=0.005)
+
+
+def test_a_brushed_stack_that_is_wished_far_brighter_has_the_same_bound_under_the_hand_and_at_rest() -> None:
+    """A smooth coat over brushed layers, wished more than ten times as bright: its index ends at 4.
+
+    Expected: both bounds there, since a smooth interface of index 4 reflects (3/5)^2.
+    """
+    brushed = vt.Interface(eta=1.3495, alpha=(0.1167, 0.0386), rotation=127.5)
+    metal = vt.Interface(eta=(2.545, 2.0635, 2.591), k=(4.087, 3.171, 4.173), alpha=(0.2627, 0.1241), rotation=65.2)
+    form: list[dict[str, Any]] = [{"energy": 0.1}, {"energy": 0.1}, {"energy": 0.1, "base": "conductor"}]
+    hand, rest, _ = beyond(Stack([vt.Interface(eta=1.634), brushed, metal]), form, 0, energy=0.6026)
+    assert hand.part == pytest.approx(rest.part, abs=0.005)
+    for found in (hand, rest):
+        assert found.reached.lobes[0].colour[0] == pytest.approx(0.36, abs=2e-3)

@@ -16,16 +16,14 @@ import numpy as np
 from velatura.inverse.lobes.target import Target
 from velatura.inverse.local.coordinates import Bound
 from velatura.inverse.local.dragged import DraggedStack
-from velatura.inverse.local.line import EXACT, Line, Reached
+from velatura.inverse.local.line import EXACT, ON_LINE, Line, Reached
 from velatura.inverse.reasons import because
 from velatura.inverse.solution import EFFORTS, in_closed_form
 from velatura.stack import Stack
 
 EFFORT = EFFORTS[:1]  # to find a stack that is not near
-# Readings of a slow model, of one line: at rest and under the hand; and where slopes are measured
-READINGS, LONG_READINGS = (10, 8), (26, 16)
+READINGS = (16, 24), (16,)  # of a slow model, for one line: at rest and under the hand
 QUICK = 2e-3  # by which an answer under the hand may miss its place on the line, in units of readings
-ON_LINE, QUICKLY_ON_LINE = 1e-3, 5e-3  # what an answer may miss the line by
 SAME = 1e-5  # difference of roughnesses of a blur that stays
 CLOSE = 0.05  # part of the way from which a wish is met by itself
 UNLIKE = 1e-3  # energy or variance by which a stack differs from the nearest that can be dragged, and is taken itself
@@ -81,12 +79,9 @@ def nearest(present: DraggedStack, wish: Target, now: Target | None = None, quic
     found, bound, part, settled = _along(present, now, possible, quick)
     if bound is not None and (other := _elsewhere(present, possible, quick)) is not None:
         found, bound, part = other, None, 1.0
-    if bound is not None and present.space.slow and not (settled or present.space.winds or (quick and part)):
-        further = _along(present, now, possible, quick, thorough=True)
-        found, bound, part = further[:3] if further[2] > part else (found, bound, part)
-    if bound is not None and part < LEAST and present.space.slow and not quick:
-        found, bound, part = _by_closed_form(present, now, possible) or (found, bound, part)
-    if bound is not None and (not present.space.slow or not (settled or part >= LEAST)):
+    if bound is not None and present.space.slow and (present.smooth or (part < LEAST and not quick)):
+        found, bound, part = _by_closed_form(present, now, possible, part, quick) or (found, bound, part)
+    if bound is not None and (not present.space.slow or not (quick or settled or part >= LEAST)):
         found, bound, part = _further(present, now, possible, found, bound, part, quick)
     if bound is not None and (dimmer := _dimmed(present, now, possible, bound, quick)) is not None:
         found, bound, part = dimmer, dataclasses.replace(bound, reason="bright"), 1.0
@@ -137,16 +132,12 @@ def _colour_lost(present: DraggedStack, wish: Target, possible: Target) -> str |
 
 
 def _along(
-    start: DraggedStack, now: Target, wish: Target, quick: bool, thorough: bool = False
+    start: DraggedStack, now: Target, wish: Target, quick: bool
 ) -> tuple[DraggedStack, Bound | None, float, bool]:
-    """The last stack on the line to a wish, the bound there, the part of the way, and whether the search ended there.
-
-    thorough: as `Line.last`.
-    """
+    """The last stack on the line to a wish, the bound there, the part of the way, and whether the search ended."""
     here, goal = _readings(start, now, now), _readings(start, now, wish)
-    allowed = QUICKLY_ON_LINE if quick else ON_LINE
-    found = _last(start, here, goal, wish, quick, thorough=thorough)
-    if found.off >= allowed or found.part >= 1 + allowed:
+    found = _last(start, here, goal, wish, quick)
+    if found.off >= ON_LINE or found.part >= 1 + ON_LINE:
         found = Reached(start.point, 0.0, 0.0, found.bound, settled=False)
     stack = dataclasses.replace(start, point=found.point).renamed(wish)
     if found.part == 0:
@@ -187,16 +178,18 @@ def _further(
 
 
 def _by_closed_form(
-    present: DraggedStack, now: Target, wish: Target
+    present: DraggedStack, now: Target, wish: Target, least: float, quick: bool
 ) -> tuple[DraggedStack, Bound | None, float] | None:
-    """The same of a slow model as `_along`, from the answer of the nearest one that adds up layers."""
+    """The same of a slow model as `_along`, from the answer of the nearest one that adds up layers; None unless that
+    leads further than a part of the way."""
     near = nearest(present.quickly, wish)
-    fresh = DraggedStack.of(near.stack.stack, wish, present.model, with_pins=True) if near.part >= LEAST else None
+    further = near.part >= max(LEAST, least)
+    fresh = DraggedStack.of(near.stack.stack, wish, present.model, with_pins=True) if further else None
     if fresh is None:
         return None
     fresh = dataclasses.replace(fresh, tail=present.tail, name=present.name, diffuse=present.diffuse)
-    found, bound, part, _ = _along(fresh, now, wish, False)
-    return (found, bound, part) if part >= LEAST else None
+    found, bound, part, _ = _along(fresh, now, wish, quick)
+    return (found, bound, part) if part >= max(LEAST, least) else None
 
 
 def _readings(start: DraggedStack, now: Target, wish: Target) -> np.ndarray:
@@ -217,11 +210,10 @@ def _beside(found: DraggedStack, wish: Target) -> float:
 
 
 def _last(
-    start: DraggedStack, here: np.ndarray, goal: np.ndarray, wish: Target, quick: bool, thorough: bool = False
+    start: DraggedStack, here: np.ndarray, goal: np.ndarray, wish: Target, quick: bool, whole: bool = False
 ) -> Reached:
     line = Line(start.point, here, goal, *start.constant(wish), enough=QUICK if quick else EXACT)
-    most = (LONG_READINGS if thorough else READINGS)[quick]
-    return line.last(most, thorough)
+    return line.last(READINGS[quick], whole)
 
 
 def _met(stack: DraggedStack, wish: Target) -> DraggedStack | None:
@@ -242,7 +234,7 @@ def _elsewhere(present: DraggedStack, wish: Target, quick: bool) -> DraggedStack
         return None
     fresh = dataclasses.replace(fresh, tail=present.tail, name=present.name, diffuse=present.diffuse)
     here, goal = fresh.point.reading.value, _readings(fresh, fresh.now(wish), wish)
-    there = _last(fresh, here, goal, wish, quick)
+    there = _last(fresh, here, goal, wish, quick, whole=True)
     stack = dataclasses.replace(fresh, point=there.point).renamed(wish)
     if there.bound is None:
         return stack

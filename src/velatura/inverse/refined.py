@@ -90,7 +90,7 @@ def _followed(found: Solution, target: Target, model: Model) -> Solution | None:
     if dragged is None or dragged.achromatic(target) is not target:
         return None
     here, goal = dragged.point.reading.value, dragged.space.goal(target)
-    there = Line(dragged.point, here, goal, *dragged.constant(target), enough=EXACT).last(FOLLOWED)
+    there = Line(dragged.point, here, goal, *dragged.constant(target), enough=EXACT).last([FOLLOWED], whole=True)
     if there.bound is not None or not there.settled:
         return None
     return Solution(target, model, tuple(there.point.layers))

@@ -17,6 +17,7 @@ from velatura.inverse.lobes.target import Target, kind_of
 from velatura.inverse.local.approach import Approach
 from velatura.inverse.local.coordinates import (
     SLACK,
+    SMOOTH,
     Bound,
     InterfaceCoordinates,
     Point,
@@ -161,6 +162,11 @@ class DraggedStack:
     def scatters(self) -> bool:
         """Whether a medium scatters, which stays where it is."""
         return any(own.scatters is not None for own in self.interfaces)
+
+    @property
+    def smooth(self) -> bool:
+        """Whether all interfaces are smooth, where no reading shows how blurs would follow."""
+        return all(np.abs(self.point.x[own.variance]).max() < SMOOTH for own in self.interfaces)
 
     @property
     def variances(self) -> Array:

@@ -23,12 +23,16 @@ ROUNDS, ENOUGH, CLOSE = 16, 1e-3, 1e-3  # of steps, the share by which the last 
 BLURRED = 0.05  # change of a variance in one step, at least
 KEPT = 0.1  # units of coordinates that are kept, as long as others do as well
 EXACT, MET = 1e-6, 1e-9  # by which readings of a slow model, and of one in closed form, may miss their place
+ON_LINE = 5e-3  # what an answer may miss the line by
 CHANGED = 1e-4  # by which a wish changes a reading at least, in those units
 DARK, FAINT, SMALL = 1e-3, 1e-4, 0.01  # energies, and variance that is added, for units of readings
 NEARLY, INNER, COARSE = 0.1, 5e-3, 1e-3  # of that, and of the last miss, what the model that is followed may miss
-TRUST, LIMIT = 3.0, 0.99  # units of coordinates that measured slopes are good for, and a share that is all of it
-FOLLOWED, GOOD = 0.05, 0.25  # misses that are small, and shares of a change, below which a step may be longer
-SLOWLY, ASTRAY = 0.7, 0.2  # the share of the last miss that is no progress, and misses that lead nowhere
+FOLLOWED, ASTRAY = 0.05, 0.5  # misses that are small, and first ones that lead nowhere
+SLOWLY, NEAR = 0.7, 0.015  # the share of the last miss that is no progress, and misses from which the way goes on
+SEEN, BACK, BEYOND = 0.03, 0.7, 1.25  # of the way that is gone astray: the least that counts, and shares to go, at most
+FURTHER_ON, ONWARDS, SHORT = 2.0, 0.02, 5e-3  # steps along the line: by an easy last one, anew, and the least
+LANDING, LOWER = 4, 0.01  # readings that lead back to the line, and by how much less is aimed at if they do not
+BENT = 0.5  # by how much corrections are off their slopes, as a share of the square of a distance
 BESIDE = 10.0  # part of the way that it is worth to be as much nearer to the line
 
 
@@ -61,65 +65,47 @@ class Line:
     caps: Sequence[tuple[int, int]] = ()
     enough: float = EXACT
 
-    def last(self, readings: int, thorough: bool = False) -> Reached:
+    def last(self, readings: Sequence[int], whole: bool = False) -> Reached:
         """The last point of the line that has a stack within the bounds.
 
         Of a model that is slow, the nearest one that adds up layers is followed, corrected by what the two differ by at
-        the points that are read (space mapping, Bandler et al. 1994), and by how that changes from one to the next
-        (Broyden's method). readings: of a slow model, at most. thorough: also by its slopes at the start, and where
-        that does not lead to the line, by shorter steps, unless these slopes take more than half of the readings.
+        the points that are read (space mapping, Bandler et al. 1994): see `_Search`.
+
+        readings: of a slow model, at most, of one search and of those that go on from where the last one ended. whole:
+        whether only all of the way counts, so that a search ends where it leads astray, or where its end is in sight.
         """
         space, x = self.start.space, self.start.x
         if not space.slow:
             correction = _Correction.none(space, x)
             x, _ = self._followed(space, x, correction, MET)
             return self._bounded(self._reached(x, space.read(x[:, None])[:, 0]), correction)
-        adder, value, trust = space.quickly, self.start.reading.value, np.inf
-        centre = _Correction.none(space, x).at(x, value, adder.read(x[:, None])[:, 0])
-        best, last, settled = (self._reached(x, value), centre), np.inf, False
-        if thorough:
-            moving = np.setdiff1d(np.arange(len(x)), [*self.held, *self._resting]).astype(int)
-            if 2 * len(moving) > readings:
-                return self._bounded(*best)
-            centre, trust, readings = centre.measured(space, moving), TRUST, readings - len(moving)
-        correction = centre
-        for _ in range(readings):
-            nearly = min(max(INNER * last, NEARLY * self.enough), COARSE)
-            x, near = self._followed(adder, correction.x, correction, nearly, trust)
-            before, value = value, space.read(x[:, None])[:, 0]
-            missed, change = (self._apart(value, of) for of in (correction.value_of(x, near), before))
-            limited = bool(np.any(np.abs(x - correction.x) > LIMIT * trust * units(correction.x)))
-            correction = correction.at(x, value, near)
-            best = max(best, (self._reached(x, value), correction), key=lambda each: self._worth(each[0]))
-            settled = max(missed, nearly) < self.enough and not limited
-            astray = missed > (ASTRAY if thorough else max(FOLLOWED, SLOWLY * last))
-            if settled or (astray and not thorough):
+        search = _Search.of(self, whole)
+        for most in readings:
+            search.go(most)
+            if search.settled or whole:
                 break
-            if astray:
-                correction, trust = centre, trust / 4
-            elif missed < max(FOLLOWED, GOOD * change):
-                trust = 2 * trust
-            centre, last = correction, missed
-        return dataclasses.replace(self._bounded(*best), settled=settled)
+        reached, read = search.best
+        found = self._bounded(reached, _Correction.fitted(space, search.read, read))
+        return dataclasses.replace(found, settled=search.settled)
+
+    def _aimed(self, part: float) -> Line:
+        """The line as far as a part of the way."""
+        return self if part == 1 else dataclasses.replace(self, goal=self.origin + part * (self.goal - self.origin))
 
     def _apart(self, a: Array, b: Array) -> float:
         """The largest difference of two readings."""
         return float(np.abs((a - b) / self._scale).max())
 
-    def _worth(self, reached: Reached) -> float:
-        """How far a point is on the line, less what it is off it."""
-        return 1 - abs(1 - reached.part) - BESIDE * reached.off
+    def _worth(self, reached: Reached) -> tuple[bool, float]:
+        """Whether a point is on the line, and how far, less what it is off it."""
+        return reached.off < ON_LINE, 1 - abs(1 - reached.part) - BESIDE * reached.off
 
-    def _followed(
-        self, space: Space, x: Array, correction: _Correction, enough: float, trust: float = np.inf
-    ) -> tuple[Array, Array]:
+    def _followed(self, space: Space, x: Array, correction: _Correction, enough: float) -> tuple[Array, Array]:
         """The last point of the line as a corrected model in closed form reads it, and what that reads uncorrected.
 
-        Coordinates that are kept move only where the others do not meet the goal. trust: the longest way, in units of
-        coordinates.
+        Coordinates that are kept move only where the others do not meet the goal.
         """
-        far = trust * units(x)
-        box = np.maximum(space.box[0], x - far), np.minimum(space.box[1], x + far)
+        box = space.box
         held = np.array(list(self.held), int)
         every, free = np.setdiff1d(np.arange(len(x)), held), np.setdiff1d(space.free, [*held, *self._resting])
         kept = np.clip(self.start.x, *box)
@@ -272,6 +258,15 @@ class Line:
 
 
 @dataclass(frozen=True)
+class _Read:
+    """A point (D,), and the readings (R,) of a slow model and of the one in its place."""
+
+    x: Array
+    value: Array
+    near: Array
+
+
+@dataclass(frozen=True)
 class _Correction:
     """Difference of a slow model from the one in its place, near a point x: value (R,), and its slopes (R, D).
 
@@ -302,22 +297,131 @@ class _Correction:
         slopes = near.slopes / sizes[1][:, None] + self.slopes[:, free] / units(x[free])
         return Reading(value, sizes[0][:, None] * slopes)
 
-    def at(self, x: Array, value: Array, near: Array) -> _Correction:
-        """The correction that is read at another point, its slopes changed by what they miss (Broyden)."""
-        step, now = self._step(x), _logarithms(value, self.least) - _logarithms(near, self.least)
-        missed = now - self.value - self.slopes @ step
-        return _Correction(x, self.least, now, self.slopes + np.outer(missed, ops.divide(step, step @ step)))
+    @classmethod
+    def fitted(cls, space: Space, read: Sequence[_Read], at: _Read) -> _Correction:
+        """The correction at one of the points that were read, its slopes by those at the others.
 
-    def measured(self, space: Space, moving: Array) -> _Correction:
-        """The correction with the slopes along some coordinates that differences of both models have."""
-        slopes = np.zeros_like(self.slopes)
-        for sign, model in ((1, space), (-1, space.quickly)):
-            reading = model.differences(self.x, moving)
-            slopes[:, moving] += sign * reading.slopes / (np.abs(reading.value) + self.least)[:, None]
-        return dataclasses.replace(self, slopes=slopes * units(self.x))
+        Slopes are the likeliest where they are about 1, and where a difference that is read at a distance is off what
+        they give by about `BENT` times its square.
+        """
+        here = cls.none(space, at.x)
+        here = dataclasses.replace(here, value=here._difference(at))
+        steps = np.array([here._step(each.x) for each in read if each is not at]).reshape(-1, len(at.x))
+        gains = np.array([here._difference(each) - here.value for each in read if each is not at])
+        far = np.linalg.norm(steps, axis=1)
+        apart = far > 0
+        weights = 1 / (BENT * far[apart, None] ** 2)
+        rows, right = weights * steps[apart], weights * gains.reshape(-1, len(here.value))[apart]
+        slopes = rows.T @ np.linalg.solve(rows @ rows.T + np.eye(len(rows)), right)
+        return dataclasses.replace(here, slopes=slopes.T)
+
+    def _difference(self, read: _Read) -> Array:
+        return _logarithms(read.value, self.least) - _logarithms(read.near, self.least)
 
     def _step(self, x: Array) -> Array:
         return _logarithms(x, units(0 * x)) - _logarithms(self.x, units(0 * x))
+
+
+@dataclass
+class _Search:
+    """A search along a line, by a slow model.
+
+    All of the way is aimed at first. Where that leads astray, the search goes back to the last point near the line, and
+    aims at a part of the way: by how far it got, then on from there, in steps like the last ones. In the end it leads
+    back to the line. So the first readings are the same, however many may follow.
+
+    read: all points so far. base, best: the last point near the line, and the best one. aim: part of the way. step,
+    end: the length of steps, and the part of the way that none leads beyond. last: what was missed before, infinite of
+    a new aim. landing, stuck: whether it leads back to the line, and whether it has begun anew from where it stood
+    still.
+    """
+
+    line: Line
+    whole: bool
+    read: list[_Read]
+    base: tuple[Reached, _Read]
+    best: tuple[Reached, _Read]
+    correction: _Correction
+    aim: float = 1.0
+    step: float = 1.0
+    end: float = 1.0
+    last: float = np.inf
+    settled: bool = False
+    landing: bool = False
+    stuck: bool = False
+
+    @classmethod
+    def of(cls, line: Line, whole: bool) -> _Search:
+        """The search from the start of a line."""
+        space, x, value = line.start.space, line.start.x, line.start.reading.value
+        first = _Read(x, value, space.quickly.read(x[:, None])[:, 0])
+        begun = line._reached(x, value), first
+        return cls(line, whole, [first], begun, begun, _Correction.fitted(space, [first], first))
+
+    def go(self, readings: int) -> None:
+        """Read at most so many points, from the best one so far."""
+        if len(self.read) > 1:
+            self.base, self.landing, self.step, self.end = self.best, False, ONWARDS, 1.0
+            self._aimed(self.base[1], self.base[0].part + self.step)
+        for left in range(readings, 0, -1):
+            if not self.landing and self.base[0].part > 0 and (left <= LANDING or self.step < SHORT):
+                self.landing = True
+                self._aimed(self.base[1], self.base[0].part, self.base[0].off)
+            if self._ends():
+                return
+
+    def _aimed(self, at: _Read, part: float, last: float = np.inf) -> None:
+        """Go on from a point that is read, to a part of the way."""
+        self.correction = _Correction.fitted(self.line.start.space, self.read, at)
+        self.aim, self.last = min(1.0, part), last
+
+    def _ends(self) -> bool:
+        """Read one more point; whether the search ends there."""
+        line, enough = self.line, self.line.enough
+        nearly = min(max(INNER * self.last, NEARLY * enough), COARSE)
+        x, near = line._aimed(self.aim)._followed(line.start.space.quickly, self.correction.x, self.correction, nearly)
+        value, expected = line.start.space.read(x[:, None])[:, 0], self.correction.value_of(x, near)
+        now, missed, hoped = _Read(x, value, near), line._apart(value, expected), line.placed(expected)[0]
+        there = line._reached(x, value)
+        self.read.append(now)
+        self.best = max(self.best, (there, now), key=lambda each: line._worth(each[0]))
+        astray = missed > (ASTRAY if self.last == np.inf else max(FOLLOWED, SLOWLY * self.last))
+        self.settled = max(missed, nearly) < enough and (self.aim == 1 or abs(hoped - self.aim) > enough)
+        if self.settled and there.off > ON_LINE and not self.stuck:
+            self.stuck, self.read = True, [now]
+            self._aimed(now, self.aim)
+            return False
+        if self.settled or (self.landing and there.off < enough):
+            return True
+        if self.whole and (astray or (missed < NEAR and hoped < 1 - FOLLOWED)):
+            return True
+        self._turned(now, there, missed, astray)
+        return False
+
+    def _turned(self, now: _Read, there: Reached, missed: float, astray: bool) -> None:
+        """Aim at the next part of the way, or at the same again."""
+        base = self.base[0]
+        gone, far = there.part - base.part, self.aim - base.part
+        if self.landing:
+            nearer = there.off < max(ON_LINE, self.last)
+            self._aimed(now, self.aim if nearer else self.aim - LOWER, there.off if nearer else np.inf)
+        elif astray:
+            known = SEEN < gone < far
+            self.step, self.end = (BACK * gone, base.part + BEYOND * gone) if known else (far / 4, 1.0)
+            self._stepped()
+        elif self.aim < 1 and max(missed, there.off, abs(there.part - self.aim)) < NEAR:
+            self.step = gone if self.last < np.inf else FURTHER_ON * gone
+            self.base = there, now
+            self._stepped()
+        else:
+            self._aimed(now, self.aim, missed)
+
+    def _stepped(self) -> None:
+        """Aim one step further than the base, by half of what is left to an end that is not near."""
+        left = self.end - self.base[0].part
+        if left > 2 * LOWER and self.end < 1:
+            self.step = min(self.step, left / 2)
+        self._aimed(self.base[1], self.base[0].part + self.step)
 
 
 def _logarithms(x: Array, least: Array) -> Array:
