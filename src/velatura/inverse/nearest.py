@@ -16,7 +16,7 @@ import numpy as np
 from velatura.inverse.lobes.target import Target
 from velatura.inverse.local.coordinates import Bound
 from velatura.inverse.local.dragged import DraggedStack
-from velatura.inverse.local.line import EXACT, ON_LINE, Line, Reached
+from velatura.inverse.local.line import EXACT, ON_LINE, QUICKLY_ON_LINE, Line, Reached
 from velatura.inverse.reasons import because
 from velatura.inverse.solution import EFFORTS, in_closed_form
 from velatura.stack import Stack
@@ -137,7 +137,8 @@ def _along(
     """The last stack on the line to a wish, the bound there, the part of the way, and whether the search ended."""
     here, goal = _readings(start, now, now), _readings(start, now, wish)
     found = _last(start, here, goal, wish, quick)
-    if found.off >= ON_LINE or found.part >= 1 + ON_LINE:
+    allowed = QUICKLY_ON_LINE if quick else ON_LINE
+    if found.off >= allowed or found.part >= 1 + allowed:
         found = Reached(start.point, 0.0, 0.0, found.bound, settled=False)
     stack = dataclasses.replace(start, point=found.point).renamed(wish)
     if found.part == 0:

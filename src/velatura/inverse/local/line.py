@@ -23,7 +23,7 @@ ROUNDS, ENOUGH, CLOSE = 16, 1e-3, 1e-3  # of steps, the share by which the last 
 BLURRED = 0.05  # change of a variance in one step, at least
 KEPT = 0.1  # units of coordinates that are kept, as long as others do as well
 EXACT, MET = 1e-6, 1e-9  # by which readings of a slow model, and of one in closed form, may miss their place
-ON_LINE = 5e-3  # what an answer may miss the line by
+ON_LINE, QUICKLY_ON_LINE = 1e-3, 5e-3  # what an answer may miss the line by, at rest and under the hand
 CHANGED = 1e-4  # by which a wish changes a reading at least, in those units
 DARK, FAINT, SMALL = 1e-3, 1e-4, 0.01  # energies, and variance that is added, for units of readings
 NEARLY, INNER, COARSE = 0.1, 5e-3, 1e-3  # of that, and of the last miss, what the model that is followed may miss
@@ -92,13 +92,18 @@ class Line:
         """The line as far as a part of the way."""
         return self if part == 1 else dataclasses.replace(self, goal=self.origin + part * (self.goal - self.origin))
 
+    @property
+    def allowed(self) -> float:
+        """What an answer may miss the line by."""
+        return QUICKLY_ON_LINE if self.enough > EXACT else ON_LINE
+
     def _apart(self, a: Array, b: Array) -> float:
         """The largest difference of two readings."""
         return float(np.abs((a - b) / self._scale).max())
 
     def _worth(self, reached: Reached) -> tuple[bool, float]:
         """Whether a point is on the line, and how far, less what it is off it."""
-        return reached.off < ON_LINE, 1 - abs(1 - reached.part) - BESIDE * reached.off
+        return reached.off < self.allowed, 1 - abs(1 - reached.part) - BESIDE * reached.off
 
     def _followed(self, space: Space, x: Array, correction: _Correction, enough: float) -> tuple[Array, Array]:
         """The last point of the line as a corrected model in closed form reads it, and what that reads uncorrected.
@@ -387,7 +392,7 @@ class _Search:
         self.best = max(self.best, (there, now), key=lambda each: line._worth(each[0]))
         astray = missed > (ASTRAY if self.last == np.inf else max(FOLLOWED, SLOWLY * self.last))
         self.settled = max(missed, nearly) < enough and (self.aim == 1 or abs(hoped - self.aim) > enough)
-        if self.settled and there.off > ON_LINE and not self.stuck:
+        if self.settled and there.off > self.line.allowed and not self.stuck:
             self.stuck, self.read = True, [now]
             self._aimed(now, self.aim)
             return False
@@ -403,7 +408,7 @@ class _Search:
         base = self.base[0]
         gone, far = there.part - base.part, self.aim - base.part
         if self.landing:
-            nearer = there.off < max(ON_LINE, self.last)
+            nearer = there.off < max(self.line.allowed, self.last)
             self._aimed(now, self.aim if nearer else self.aim - LOWER, there.off if nearer else np.inf)
         elif astray:
             known = SEEN < gone < far
