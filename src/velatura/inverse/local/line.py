@@ -94,7 +94,7 @@ class Line:
 
     @property
     def allowed(self) -> float:
-        """What an answer may miss the line by."""
+        """Largest distance from the line that an answer may have."""
         return QUICKLY_ON_LINE if self.enough > EXACT else ON_LINE
 
     def _apart(self, a: Array, b: Array) -> float:
