@@ -39,8 +39,8 @@ def compile_quickly(cache: Path) -> None:
         _ask(llvm, QUICKLY)
     original = compiled._kernel
 
-    def of_loops(*arguments: Any) -> Any:
-        found = original(*arguments)
+    def of_loops(*arguments: Any, **named: Any) -> Any:
+        found = original(*arguments, **named)
 
         def launch(*given: Any) -> Any:
             for llvm in libraries:
