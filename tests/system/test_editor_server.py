@@ -22,6 +22,7 @@ from collections.abc import Callable, Iterator
 from concurrent.futures import FIRST_COMPLETED, ThreadPoolExecutor, wait
 from contextlib import contextmanager
 from pathlib import Path
+from types import ModuleType
 from typing import Any
 from urllib.parse import urlsplit
 
@@ -412,6 +413,14 @@ def test_an_answer_that_takes_too_long_is_given_up(here: Path, monkeypatch: pyte
     monkeypatch.setitem(service.VERBS, "invert", lambda body: {"waited": threading.Event().wait(1)})
     with served() as port:
         assert call(port, "invert", {}) == (503, {"error": "invert: has no answer after 0.2 seconds"})
+
+
+def test_an_answer_stands_while_another_thread_loads_kernels(here: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Expected: the module that releases them may be there, but have no functions yet."""
+    name = "velatura.renderer.compiled"
+    monkeypatch.setitem(sys.modules, name, ModuleType(name))
+    with served() as port:
+        assert call(port, "object", {"name": "ball"})[0] == 200
 
 
 def test_answers_that_are_given_up_stop_no_others(here: Path, monkeypatch: pytest.MonkeyPatch) -> None:

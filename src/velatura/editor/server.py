@@ -196,8 +196,9 @@ def _answer(verb: Verb, body: Callable[[], Body]) -> tuple[int, str]:
         return 409 if isinstance(error, Conflict) else 422, _error(str(error))
     finally:
         kernel.return_memory()
-        if compiled := sys.modules.get("velatura.renderer.compiled"):  # which loads SciPy
-            compiled.release_kernels()
+        # It is slow to load, and another thread may be loading it
+        if release := getattr(sys.modules.get("velatura.renderer.compiled"), "release_kernels", None):
+            release()
 
 
 def _text(answer: Answer) -> str:
