@@ -647,6 +647,20 @@ def test_a_dropped_object_is_seen(visit: Open) -> None:
     assert float(np.mean(np.abs(page.picture() - before))) < SAME
 
 
+def test_where_a_dropped_object_is_lost_the_first_one_is_seen(visit: Open) -> None:
+    page = visit()
+    before = page.picture()
+    page.drop(("triangle.glb", _glb()))
+    page.page.wait_for_function("() => velatura.store.get().view.object === 'file:triangle.glb'")
+    assert float(np.mean(np.abs(page.picture() - before))) > OTHER
+    # It waits until the page is left
+    page.page.evaluate("async () => { for (const { name } of await indexedDB.databases()) indexedDB.deleteDatabase(name) }")
+    page.page.reload()
+    page.ready()
+    page.page.locator(".messages").get_by_text("triangle.glb: drop this file on the page again").wait_for()
+    assert float(np.mean(np.abs(page.picture() - before))) < SAME
+
+
 def _glb() -> bytes:
     """One triangle that faces the camera."""
     positions = np.array([[-1, 0, 0], [1, 0, 0], [0, 2, 0]], "<f4").tobytes()

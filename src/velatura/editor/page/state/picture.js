@@ -205,6 +205,7 @@ export function follow({ store, viewport, call, lacks, session, files, onProblem
   const part = { viewport, call, lacks, session, onShader, onProblem, onBaked };
   const slots = Object.fromEntries(Object.keys(viewport.slots).map((name) => [name, new Slot(name, part)]));
   const shown = {};
+  const placed = new Set(); // keys of the view that something is shown of
   let home = null; // the camera that the object's own view asks for
 
   /** Does something for a key of the view, once for every value of it; it is tried again where it failed. */
@@ -217,6 +218,17 @@ export function follow({ store, viewport, call, lacks, session, files, onProblem
     } catch (error) {
       if (shown[key] === value) shown[key] = undefined;
       onProblem(key, error);
+    }
+  }
+
+  /** Shows what a name stands for; and where that is lost, and nothing is shown yet, `first`, which never is. */
+  async function place(key, name, first, load, show) {
+    try {
+      await show(await load(name));
+      placed.add(key);
+    } catch (error) {
+      if (!placed.has(key) && name !== first) await place(key, first, first, load, show).catch(() => {});
+      throw error;
     }
   }
 
@@ -238,13 +250,17 @@ export function follow({ store, viewport, call, lacks, session, files, onProblem
       tiles: tiles.map(({ slot }) => slot).join(''),
       lobe: lobe < slots.a.shader?.parts.flatMap(({ shown }) => shown).length ? lobe : null,
     });
-    once('object', object, async (name) => {
-      await viewport.setObject(await files.object(name));
-      home = viewport.camera;
-      viewport.setCamera(store.get().camera ?? home);
-      onObject();
-    });
-    once('environment', environment, async (name) => viewport.setEnvironment(await files.environment(name)));
+    once('object', object, (name) =>
+      place('object', name, session.objects?.[0], files.object, async (given) => {
+        await viewport.setObject(given);
+        home = viewport.camera;
+        viewport.setCamera(store.get().camera ?? home);
+        onObject();
+      }),
+    );
+    once('environment', environment, (name) =>
+      place('environment', name, session.environments?.[0]?.name, files.environment, (given) => viewport.setEnvironment(given)),
+    );
     once('lights', lights, async () => viewport.setLights(lights));
     const beside = isPaired(state.view) && other?.photograph;
     once('photograph', beside || null, async (name) => viewport.setPhotograph(name && (await files.photograph(name))));
