@@ -654,7 +654,9 @@ def test_where_a_dropped_object_is_lost_the_first_one_is_seen(visit: Open) -> No
     page.page.wait_for_function("() => velatura.store.get().view.object === 'file:triangle.glb'")
     assert float(np.mean(np.abs(page.picture() - before))) > OTHER
     # It waits until the page is left
-    page.page.evaluate("async () => { for (const { name } of await indexedDB.databases()) indexedDB.deleteDatabase(name) }")
+    page.page.evaluate(
+        "async () => { for (const { name } of await indexedDB.databases()) indexedDB.deleteDatabase(name) }"
+    )
     page.page.reload()
     page.ready()
     page.page.locator(".messages").get_by_text("triangle.glb: drop this file on the page again").wait_for()
