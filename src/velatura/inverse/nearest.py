@@ -16,7 +16,7 @@ import numpy as np
 from velatura.inverse.lobes.target import Target
 from velatura.inverse.local.coordinates import Bound
 from velatura.inverse.local.dragged import DraggedStack
-from velatura.inverse.local.line import EXACT, ON_LINE, QUICKLY_ON_LINE, Line, Reached
+from velatura.inverse.local.line import EXACT, Line, Reached
 from velatura.inverse.reasons import because
 from velatura.inverse.solution import EFFORTS, in_closed_form
 from velatura.stack import Stack
@@ -136,9 +136,9 @@ def _along(
 ) -> tuple[DraggedStack, Bound | None, float, bool]:
     """The last stack on the line to a wish, the bound there, the part of the way, and whether the search ended."""
     here, goal = _readings(start, now, now), _readings(start, now, wish)
-    found = _last(start, here, goal, wish, quick)
-    allowed = QUICKLY_ON_LINE if quick else ON_LINE
-    if found.off >= allowed or found.part >= 1 + allowed:
+    line = _line(start, here, goal, wish, quick)
+    found = line.last(READINGS[quick])
+    if found.off >= line.allowed or found.part >= 1 + line.allowed:
         found = Reached(start.point, 0.0, 0.0, found.bound, settled=False)
     stack = dataclasses.replace(start, point=found.point).renamed(wish)
     if found.part == 0:
@@ -210,11 +210,8 @@ def _beside(found: DraggedStack, wish: Target) -> float:
     return float(np.abs(space.goal(found.now(wish)) - space.goal(wish))[space.counted].max())
 
 
-def _last(
-    start: DraggedStack, here: np.ndarray, goal: np.ndarray, wish: Target, quick: bool, whole: bool = False
-) -> Reached:
-    line = Line(start.point, here, goal, *start.constant(wish), enough=QUICK if quick else EXACT)
-    return line.last(READINGS[quick], whole)
+def _line(start: DraggedStack, here: np.ndarray, goal: np.ndarray, wish: Target, quick: bool) -> Line:
+    return Line(start.point, here, goal, *start.constant(wish), enough=QUICK if quick else EXACT)
 
 
 def _met(stack: DraggedStack, wish: Target) -> DraggedStack | None:
@@ -235,7 +232,7 @@ def _elsewhere(present: DraggedStack, wish: Target, quick: bool) -> DraggedStack
         return None
     fresh = dataclasses.replace(fresh, tail=present.tail, name=present.name, diffuse=present.diffuse)
     here, goal = fresh.point.reading.value, _readings(fresh, fresh.now(wish), wish)
-    there = _last(fresh, here, goal, wish, quick, whole=True)
+    there = _line(fresh, here, goal, wish, quick).last(READINGS[quick], whole=True)
     stack = dataclasses.replace(fresh, point=there.point).renamed(wish)
     if there.bound is None:
         return stack

@@ -7,7 +7,7 @@ axes that are a thousand times as long as others.
 
 from __future__ import annotations
 
-from collections.abc import Set
+from collections.abc import Callable, Set
 from dataclasses import dataclass, replace
 from math import pi
 
@@ -77,6 +77,13 @@ def frame(material: Material) -> Frame:
     if not any(layer.rotation for layer in numbers.interfaces):
         return Frame()
     return Frame.of(material if Variables.of(material).given else numbers)
+
+
+def in_axes(material: Material, variance: type[Variance], make: Callable[[Material, type[Variance]], Body]) -> Body:
+    """The body of a material with constants of a renderer, by the one that `make` makes of it, and of its kind of
+    variance, in its own axes."""
+    own = frame(material)
+    return own.turned(make(own.back(material), own.kind(variance)), material)
 
 
 def _rotation(layer: int) -> str:

@@ -53,8 +53,7 @@ class PaperModel(Model):
         from velatura.model import rotation_frame
         from velatura.model.papers import bsdf
 
-        frame = rotation_frame.frame(material)
-        return frame.turned(bsdf.body(frame.back(material), self, frame.kind(variance), context), material)
+        return rotation_frame.in_axes(material, variance, lambda own, kind: bsdf.body(own, self, kind, context))
 
     def statistics(self, material: Material, wi: Direction) -> StackLobes:
         from velatura.model.papers import statistics

@@ -72,8 +72,7 @@ class SolvedModel(Model):
             return self.pointwise.body(material, variance, context)
 
         def solved(material: Material) -> Body:
-            frame = rotation_frame.frame(material)
-            return frame.turned(solve.solve(frame.back(material), self, frame.kind(variance), context), material)
+            return rotation_frame.in_axes(material, variance, lambda own, kind: solve.solve(own, self, kind, context))
 
         return whole_differences.body(material, solved)
 
