@@ -2,16 +2,19 @@
 
 A page in headless Chromium, on the processor (SwiftShader), draws four balls under a prefiltered environment by one
 material after the other, round by round. Prints, for each preset, the processor time of the browser's processes over
-that by the engine's own material in the same round: plain; with the clearcoat and anisotropy, or the transmission, that
-such presets need there; and seen from both sides, as glass is, where SwiftShader shades hidden ones too. Needs psutil.
+that by the engine's own material in the same round: plain, and as `--to gltf` bakes the preset into it, with the
+clearcoat, anisotropy, iridescence or transmission that it takes there. Needs psutil.
 
     python benchmarks/frames.py [--presets bare-gold,coated-gold,...] [--rounds 9] [--frames 4] [--size 440]
 """
 
 from __future__ import annotations
 
+import base64
 import sys
+from collections.abc import Sequence
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import Any
 
 import numpy as np
@@ -26,8 +29,6 @@ import in_three
 import velatura as vt
 
 PRESETS = "bare-gold,car-paint,varnished-paint,wet-copper,anodised-titanium,coated-gold,frosted-glass"
-
-OWN = ("clearcoat and anisotropy", "both sides", "transmission", "transmission, both sides")  # as the page has them
 
 STAGE = """
 async (job) => {
@@ -48,15 +49,13 @@ async (job) => {
     scene.add(ball);
     return ball;
   });
-  const materials = [
-    new THREE.MeshPhysicalMaterial({ color: 0xffc070, metalness: 1, roughness: 0.4 }),
-    new THREE.MeshPhysicalMaterial({
-      color: 0xffc070, metalness: 1, roughness: 0.4, clearcoat: 1, clearcoatRoughness: 0.2, anisotropy: 0.5,
-    }),
-    new THREE.MeshPhysicalMaterial({ metalness: 1, roughness: 0.4, side: THREE.DoubleSide }),
-    new THREE.MeshPhysicalMaterial({ roughness: 0.4, transmission: 1 }),
-    new THREE.MeshPhysicalMaterial({ roughness: 0.4, transmission: 1, side: THREE.DoubleSide }),
-  ];
+  const { GLTFLoader } = await import('/examples/jsm/loaders/GLTFLoader.js');
+  const materials = [new THREE.MeshPhysicalMaterial({ color: 0xffc070, metalness: 1, roughness: 0.4 })];
+  for (const text of job.baked) {
+    const bytes = Uint8Array.from(atob(text), (letter) => letter.charCodeAt(0));
+    const { scene } = await new GLTFLoader().parseAsync(bytes.buffer, '');
+    scene.traverse((each) => each.isMesh && materials.push(each.material));
+  }
   for (const module of job.modules) materials.push(new (await import(module)).LayeredMaterial());
   const gl = renderer.getContext(), pixel = new Uint8Array(4);
   window.draw = ([k, frames]) => {
@@ -70,23 +69,29 @@ async (job) => {
 """
 
 
-def times(page: Any, modules: list[str], rounds: int, frames: int, size: int) -> np.ndarray:
-    """Processor time of frames in milliseconds, of the engine's own material, plain and as `OWN` has it, and of the
-    modules; (materials, rounds)."""
-    page.evaluate(STAGE, {"modules": modules, "size": size})
+def times(page: Any, presets: Sequence[str], rounds: int, frames: int, size: int) -> tuple[np.ndarray, ...]:
+    """Processor time of frames in milliseconds: of the plain material (rounds,), of each preset as the engine's own
+    material, and of its module (presets, rounds)."""
+    baked = [base64.b64encode(_binary(preset)).decode() for preset in presets]
+    page.evaluate(STAGE, {"modules": [f"/{preset}.js" for preset in presets], "baked": baked, "size": size})
     processes = psutil.Process().children(recursive=True)
 
     def spent() -> float:
         return sum(sum(process.cpu_times()[:2]) for process in processes)
 
-    found = np.zeros((1 + len(OWN) + len(modules), rounds))
+    found = np.zeros((1 + 2 * len(presets), rounds))
     for turn in range(-1, rounds):
         for k in range(len(found)):
             before = spent()
             page.evaluate("job => window.draw(job)", [k, frames])
             if turn >= 0:
                 found[k, turn] = (spent() - before) / frames * 1e3
-    return found
+    return found[0], *np.split(found[1:], 2)
+
+
+def _binary(preset: str) -> bytes:
+    with TemporaryDirectory() as folder:
+        return vt.export(preset, "gltf", mesh="sphere").save(Path(folder) / "ball.glb")[0].read_bytes()
 
 
 def main() -> None:
@@ -97,11 +102,11 @@ def main() -> None:
     presets = options.presets.split(",")
     with in_three.stage() as stage:
         stage.files.update({f"{preset}.js": vt.export(preset, "three").text for preset in presets})
-        modules = [f"/{preset}.js" for preset in presets]
-        plain, *others = times(stage.page, modules, options.rounds, options.frames, options.size)
+        plain, baked, found = times(stage.page, presets, options.rounds, options.frames, options.size)
     row("frames", "MeshPhysicalMaterial", plain.tolist(), "ms")
-    for name, found in zip([*(f"the same, {each}" for each in OWN), *presets], others):
-        row("frames", name, (found / plain).tolist(), "of a frame")
+    for preset, own, module in zip(presets, baked, found):
+        row("frames", f"{preset}, baked into it", (own / plain).tolist(), "of a frame")
+        row("frames", preset, (module / plain).tolist(), "of a frame", f"{np.median(module / own):.2f} of it baked")
 
 
 if __name__ == "__main__":

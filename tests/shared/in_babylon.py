@@ -29,10 +29,17 @@ async (job) => {
   if (job.light) {
     const [x, y, z] = job.light;
     new BABYLON.DirectionalLight('light', new BABYLON.Vector3(-x, -y, z), scene);
+  } else if (job.rectangle) {
+    // It shines along -z of its own, which is turned towards the ball; depth is the other way round
+    const [width, height, [x, y, z]] = job.rectangle;
+    const stand = new BABYLON.TransformNode('stand', scene);
+    stand.position.set(x, y, -z);
+    stand.lookAt(stand.position.scale(2));
+    new BABYLON.RectAreaLight('light', BABYLON.Vector3.Zero(), width, height, scene).parent = stand;
   } else {
     scene.environmentTexture = await new Promise((done, failed) => {
       const sky = new BABYLON.HDRCubeTexture(
-        '/sky.hdr', scene, 32, false, true, false, true, () => done(sky), failed, false, true,
+        '/sky.hdr', scene, TEXELS, false, true, false, true, () => done(sky), failed, false, true,
       );
     });
   }
@@ -53,9 +60,19 @@ async (job) => {
 }
 """
 
-BABYLON = Engine(
-    Path(__file__).parents[1] / "page" / "node_modules" / "babylonjs",
-    "https://unpkg.com/babylonjs@[0-9.]+/",
-    """<!doctype html><script src="/babylon.js"></script>""",
-    DRAW,
-)
+# Tables that the engine fetches where a scene has area lights, for its own materials; nothing of them is read here
+TABLES = {"https://assets.babylonjs.com/core/areaLights/areaLightsLTC.bin": bytes(64 * 64 * 8 * 2)}
+
+
+def engine(texels: int) -> Engine:
+    """The engine, whose environments are cubes of so many texels to a side."""
+    return Engine(
+        Path(__file__).parents[1] / "page" / "node_modules" / "babylonjs",
+        "https://unpkg.com/babylonjs@[0-9.]+/",
+        """<!doctype html><script src="/babylon.js"></script>""",
+        DRAW.replace("TEXELS", str(texels)),
+        turned=0.25,
+    )
+
+
+BABYLON = engine(32)

@@ -144,13 +144,15 @@ Object.assign(GPUCanvasContext.prototype, {
 @dataclass(frozen=True)
 class Engine:
     """An engine: the folder of its package, the address in place of which it is served, a page with it, and a function
-    that draws a ball there; a script that keeps what canvases show, where no screenshot has it."""
+    that draws a ball there; a script that keeps what canvases show, where no screenshot has it; and how far its
+    panoramas begin from those of three.js, in turns."""
 
     folder: Path
     network: str
     page: str
     draw: str
     keep: str = ""
+    turned: float = 0
 
 
 @dataclass(frozen=True)
@@ -174,11 +176,12 @@ class Stage:
 
         Args:
             module: text of an export.
-            sky: environment (height, width, 3), from the top, y up, in the engine's coordinates.
+            sky: environment (height, width, 3), from the top, y up, in three.js's coordinates.
             light: direction of a light in place of the environment.
             rectangle: a light in place of the environment.
         """
         name = f"{len(self.files)}.js"
+        sky = np.roll(sky, int(self.engine.turned * sky.shape[1]), axis=1)
         self.files.update({name: module, "sky.hdr": radiance(sky)})
         rgba = np.pad(sky[::-1], ((0, 0), (0, 0), (0, 1)), constant_values=1).astype("<f4")
         found = self.page.evaluate(
@@ -330,10 +333,10 @@ def missed_by_rectangle(stage: Stage, material: MaterialLike, to: str) -> float:
     return matched(expected, np.array([found[place] for place in pixels]))
 
 
-def missed_by_environment(stage: Stage, material: MaterialLike, to: str, samples: int, turned: int = 0) -> float:
-    """The same under `softbox`, by means of so many samples for each pixel; engines may have it turned by columns."""
+def missed_by_environment(stage: Stage, material: MaterialLike, to: str, samples: int) -> float:
+    """The same under `softbox`, by means of so many samples for each pixel."""
     sky = softbox()
-    [expected] = sampled(material, [np.roll(sky, -turned, axis=1)], SIZE, samples, TILT)
+    [expected] = sampled(material, [sky], SIZE, samples, TILT)
     return matched(expected, stage.ball(vt.export(material, to).text, sky, SIZE, tilt=TILT))
 
 
@@ -384,16 +387,23 @@ def sampled(material: MaterialLike, skies: Sequence[Array], size: int, samples: 
     body = body_of(material)
     asked = Query(radiance=False)
     wo = np.array(np.broadcast_arrays(*body.sample(wi, u.ravel(), u1.ravel(), u2.ravel(), asked)))
-    w = np.einsum("kan,kns->ans", frame, wo.reshape(3, count, samples))
+    own = np.einsum("kan,kns->ans", frame, wo.reshape(3, count, samples))
+
+    def evaluated(w: Array) -> tuple[Array, Array]:
+        """Values (3, count, samples) and densities of directions in the world."""
+        x, y, z = np.einsum("kan,ans->kns", frame, w).reshape(3, -1)
+        value, density = body.eval_pdf(wi, (x, y, z), asked)
+        value = np.broadcast_to(value, (3, count * samples)).reshape(3, count, -1)
+        return value, np.reshape(density, (count, -1))
+
+    of_own = evaluated(own)
     pictures: list[Array] = []
     for sky in skies:
-        drawn = np.concatenate([w, _towards_lights(sky, (count, samples), generator)], axis=-1)
-        each = np.einsum("kan,ans->kns", frame, drawn).reshape(3, -1)
-        twice = tuple(np.repeat(frame[:, 2], 2 * samples, axis=1))
-        value, density = body.eval_pdf(twice, (each[0], each[1], each[2]), asked)
-        value = np.broadcast_to(value, (3, count * 2 * samples)).reshape(3, count, -1)
+        lights = _towards_lights(sky, (count, samples), generator)
+        drawn = np.concatenate([own, lights], axis=-1)
+        value, density = (np.concatenate(each, axis=-1) for each in zip(of_own, evaluated(lights)))
         # The balance heuristic (Veach and Guibas 1995, Eq. 14)
-        density = np.reshape(density, (count, -1)) + _density_of_lights(sky, drawn)
+        density = density + _density_of_lights(sky, drawn)
         weight = np.where(density > 0, value / np.where(density > 0, density, 1), 0) / samples
         picture = np.zeros((size, size, 4))
         picture[inside] = np.concatenate([(weight * looked_up(sky, drawn)).sum(axis=-1), np.ones((1, count))]).T

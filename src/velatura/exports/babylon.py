@@ -29,6 +29,7 @@ def write(request: Request) -> Export:
         "layeredMaterial",
         digest=hashlib.sha256(code.encode()).hexdigest()[:16],
         culled=str(not made.two_sided).lower(),
+        rectangle="\n".join(real_time.RECTANGLE.values()),
         above="" if made.two_sided else "\n    vt_wi = normalize(vec3(vt_wi.xy, max(vt_wi.z, 1e-3)));",
     )
 
@@ -43,7 +44,7 @@ _MODULE = """\
 // BABYLON is what `import * as BABYLON from '@babylonjs/core'` gives, or the global of babylon.js. The material meets
 // the lights, shadows, fog and image processing of a scene, and its environmentTexture, a prefiltered cube. Brushed
 // layers follow the texture coordinates. Light that passes comes from the environment behind, not from other
-// objects; hemispheric lights act as directional ones, and area lights are not met.
+// objects; hemispheric lights act as directional ones, and textures of area lights are left out.
 
 /** The model's functions, in GLSL ES 3.00. */
 export const code = `
@@ -58,6 +59,11 @@ const frame = `
 /** What it makes of an environment, by vt_blurred(direction, root of alpha). */
 const environment = `
 {environment}
+`;
+
+/** The light of a rectangle in place of an environment's. */
+const rectangle = `
+{rectangle}
 `;
 
 const definitions = `
@@ -76,8 +82,8 @@ vec3 vt_direct(preLightingInfo light, vec3 colour) {{
 #define computeSpecularLighting(light, n, f0, f, roughness, colour) vt_direct(light, colour)
 
 #if defined(REFLECTION) && defined(REFLECTIONMAP_3D) && defined(LODBASEDMICROSFURACE)
-#define VT_ENVIRONMENT
-vec3 vt_blurred(vec3 w, float roughness) {{
+#define VT_SKY
+vec3 vt_sky_blurred(vec3 w, float roughness) {{
     vec3 seen = vec3(reflectionMatrix * vec4(vt_frame * w, 0.0));
     #ifdef INVERTCUBICMAP
     seen.y = -seen.y;
@@ -105,8 +111,45 @@ vec3 vt_blurred(vec3 w, float roughness) {{
     #endif
     return light.rgb * vReflectionInfos.x * vReflectionColor;
 }}
+#endif
+
+#if defined(AREALIGHTUSED) && defined(AREALIGHTSUPPORTED)
+#define VT_RECTANGLES
+${{rectangle}}
+struct VtRectangle {{ vec3 middle; vec3 u; vec3 v; }};
+VtRectangle vt_lit_by;
+bool vt_by_rectangle = false;
+#endif
+
+#if defined(VT_SKY) || defined(VT_RECTANGLES)
+vec3 vt_blurred(vec3 w, float roughness) {{
+    #ifdef VT_RECTANGLES
+    if (vt_by_rectangle) {{
+        return vec3(vt_rectangle(vt_frame * w, vt_lit_by.middle, vt_lit_by.u, vt_lit_by.v, roughness));
+    }}
+    #endif
+    #ifdef VT_SKY
+    return vt_sky_blurred(w, roughness);
+    #else
+    return vec3(0.0);
+    #endif
+}}
 
 ${{environment}}
+#endif
+
+#ifdef VT_RECTANGLES
+preLightingInfo vt_area(vec3 p, vec4 light, vec3 u, vec3 v) {{
+    preLightingInfo info;
+    vt_lit_by = VtRectangle(light.xyz - p, u, v);
+    vt_by_rectangle = true;
+    info.areaLightDiffuse = vt_environment(vt_wi);
+    vt_by_rectangle = false;
+    return info;
+}}
+#define computeAreaPreLightingInfo(a, b, view, n, p, light, u, v, roughness) vt_area(p, light, u, v)
+#define computeAreaPreLightingInfoWithTexture(a, b, c, view, n, p, light, u, v, roughness) vt_area(p, light, u, v)
+#define computeAreaSpecularLighting(light, colour, f0, f90) (colour * light.areaLightDiffuse)
 #endif
 `;
 
@@ -131,7 +174,7 @@ const composition = `
 finalDiffuse = finalAmbient = vec3(0.0);
 #ifdef REFLECTION
 finalIrradiance = finalRadianceScaled = vec3(0.0);
-#ifdef VT_ENVIRONMENT
+#ifdef VT_SKY
 finalRadianceScaled = vt_environment(vt_wi) * vLightingIntensity.z;
 #endif
 #endif
