@@ -104,6 +104,13 @@ PREVIEWS_ALONE = """Object.defineProperty(window, 'velatura', {
 })"""
 
 
+# What a page writes last may else arrive after the next one, of another process, has cleared the storage
+WRITES_NO_MORE = """() => {
+  try { localStorage.clear(); } catch { /* a document without storage */ }
+  Storage.prototype.setItem = () => {};
+}"""
+
+
 class Visit:
     """A page of the editor, with what its console has complained about; a slow machine has its time."""
 
@@ -137,6 +144,7 @@ class Visit:
         for event, listener in self._listeners.items():
             self.page.remove_listener(event, listener)
         self._devtools.detach()  # with all scripts
+        self.page.evaluate(WRITES_NO_MORE)
 
     def _listen(self, message: Any) -> None:
         if message.type == "error":
