@@ -25,6 +25,7 @@ STEPS = {
     "film_thickness_nm": 3.0,
 }  # least; rotations are in degrees
 STEP = 0.005
+UPRIGHT = 0.01  # of the density of flat facets, which counts
 ROUNDED = 1e-6  # share of an index that means of colours are off by
 
 
@@ -59,11 +60,11 @@ class Variables:
     def by_whole(self) -> Iterator[tuple[int, float, tuple[float, float]]]:
         """Numbers whose slopes are differences of whole BSDFs: the number of the variable, its value, and the ends of
         the step. They are beside a kink. Of indices, steps end there, or over them another side of an interface gets
-        the denser one, or light passes a medium rarer than the outside: its edges, beyond which facets face away, move.
-        Over those of a roughness, the axes of an interface among others become alike, or pass each other: it is brushed
-        along another one, and lobes are parted anew.
+        the denser one, or light passes a medium rarer than the outside, or facets of which some stand upright: its
+        edges, beyond which facets face away, move. Over those of a roughness, the axes of an interface among others
+        become alike, or pass each other: it is brushed along another one, and lobes are parted anew.
         """
-        edged = self.start.transmits and not _denser(self.start).all()
+        edged = self.start.transmits and (_upright(self.start) or not _denser(self.start).all())
         for k, x in enumerate(self._numbers):
             role, ends = self.addresses[self.given[k].places[0][0]].role, self.around(k, x)
             if role == "eta":
@@ -156,6 +157,12 @@ def _denser(material: Material) -> NDArray[np.bool_]:
         outside = (1 - ROUNDED) * np.mean(seen.exterior)
         found += [np.mean(each.above) >= outside for each in chain(seen) if isinstance(each.layer, InterfaceValues)]
     return np.array(found, bool)
+
+
+def _upright(material: Material) -> bool:
+    """Whether facets are so rough together that upright ones have a hundredth of the density of flat ones: GGX has
+    alpha^4 of it there."""
+    return sum(layer.alpha_u * layer.alpha_v for layer in material.interfaces) > UPRIGHT**0.5
 
 
 def _steps(material: Material) -> tuple[bool, ...]:
