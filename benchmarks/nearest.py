@@ -113,7 +113,7 @@ def nearer(present: DraggedStack, answer: Nearest, count: int, rng: np.random.Ge
     if not points.size:
         return 0.0
     starts = points[:, ahead(space.read(points), 1.0, FOLLOWED)]
-    ends = [dataclasses.replace(line, start=Point(space, start)).last(READINGS[False]) for start in starts.T]
+    ends = [dataclasses.replace(line, start=Point(space, start)).last(READINGS) for start in starts.T]
     return max((end.part for end in ends if end.off < ON_LINE), default=0.0)
 
 

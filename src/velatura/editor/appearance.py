@@ -230,7 +230,8 @@ def _shown(stack: Stack, model: Model, says: str) -> Answer:
 def invert(body: Body) -> Answer:
     """The stack with the lobes of a target, or of the nearest on the way there; near `material` if that is given.
 
-    With `read`, the lobes that the material has, a model without a closed form is read few times: `rough` says so.
+    With `read`, the lobes that the material has, a model without a closed form is read until the answer is near:
+    `rough` says so.
     """
     wish = Target.from_dict(body.get("target")).of_lobes()
     model, material = reader_of(body, wish), body.get("material")

@@ -16,14 +16,13 @@ import numpy as np
 from velatura.inverse.lobes.target import Target
 from velatura.inverse.local.coordinates import Bound
 from velatura.inverse.local.dragged import DraggedStack
-from velatura.inverse.local.line import EXACT, Line, Reached
+from velatura.inverse.local.line import EXACT, QUICK, Line, Reached
 from velatura.inverse.reasons import because
 from velatura.inverse.solution import EFFORTS, in_closed_form
 from velatura.stack import Stack
 
 EFFORT = EFFORTS[:1]  # to find a stack that is not near
-READINGS = (16, 24), (16,)  # of a slow model, for one line: at rest and under the hand
-QUICK = 2e-3  # by which an answer under the hand may miss its place on the line, in units of readings
+READINGS = 16, 24  # of a slow model, for one line
 SAME = 1e-5  # difference of roughnesses of a blur that stays
 CLOSE = 0.05  # part of the way from which a wish is met by itself
 UNLIKE = 1e-3  # energy or variance by which a stack differs from the nearest that can be dragged, and is taken itself
@@ -68,7 +67,7 @@ def nearest(present: DraggedStack, wish: Target, now: Target | None = None, quic
     """The nearest stack to a wish from a present one.
 
     now: the present lobes, where they are not quite those of a stack that can be dragged, as of metals by spectra.
-    quick: by few readings of a slow model, under the hand.
+    quick: as exact as is needed under the hand; readings of a slow model that follow make the answer exact.
     """
     quick = quick and present.space.slow
     possible = present.achromatic(wish)
@@ -79,9 +78,9 @@ def nearest(present: DraggedStack, wish: Target, now: Target | None = None, quic
     found, bound, part, settled = _along(present, now, possible, quick)
     if bound is not None and (other := _elsewhere(present, possible, quick)) is not None:
         found, bound, part = other, None, 1.0
-    if bound is not None and present.space.slow and (present.smooth or (part < LEAST and not quick)):
+    if bound is not None and present.space.slow and (present.smooth or part < LEAST):
         found, bound, part = _by_closed_form(present, now, possible, part, quick) or (found, bound, part)
-    if bound is not None and (not present.space.slow or not (quick or settled or part >= LEAST)):
+    if bound is not None and (not present.space.slow or not (settled or part >= LEAST)):
         found, bound, part = _further(present, now, possible, found, bound, part, quick)
     if bound is not None and (dimmer := _dimmed(present, now, possible, bound, quick)) is not None:
         found, bound, part = dimmer, dataclasses.replace(bound, reason="bright"), 1.0
@@ -137,13 +136,13 @@ def _along(
     """The last stack on the line to a wish, the bound there, the part of the way, and whether the search ended."""
     here, goal = _readings(start, now, now), _readings(start, now, wish)
     line = _line(start, here, goal, wish, quick)
-    found = line.last(READINGS[quick])
+    found = line.last(READINGS)
     if found.off >= line.allowed or found.part >= 1 + line.allowed:
         found = Reached(start.point, 0.0, 0.0, found.bound, settled=False)
     stack = dataclasses.replace(start, point=found.point).renamed(wish)
     if found.part == 0:
         return stack, found.bound or start.space.unmet(int(np.argmax(np.abs(goal - here)))), 0.0, found.settled
-    close = not quick and found.off < CLOSE and abs(1 - found.part) < CLOSE
+    close = found.off < CLOSE and abs(1 - found.part) < CLOSE
     if found.bound is not None and close and (met := _met(stack, wish)) is not None:
         return met, None, 1.0, True
     return stack, found.bound, found.part, found.settled
@@ -232,11 +231,11 @@ def _elsewhere(present: DraggedStack, wish: Target, quick: bool) -> DraggedStack
         return None
     fresh = dataclasses.replace(fresh, tail=present.tail, name=present.name, diffuse=present.diffuse)
     here, goal = fresh.point.reading.value, _readings(fresh, fresh.now(wish), wish)
-    there = _line(fresh, here, goal, wish, quick).last(READINGS[quick], whole=True)
+    there = _line(fresh, here, goal, wish, quick).last(READINGS, whole=True)
     stack = dataclasses.replace(fresh, point=there.point).renamed(wish)
     if there.bound is None:
         return stack
-    return None if quick or there.off > CLOSE else _met(stack, wish)
+    return None if there.off > CLOSE else _met(stack, wish)
 
 
 def lobes_of(stack: Stack, dragged: DraggedStack) -> Target:

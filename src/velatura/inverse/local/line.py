@@ -8,13 +8,13 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Collection, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 
 import numpy as np
 
 from velatura import ops
-from velatura.inverse.lobes.partial_stack import Array
+from velatura.inverse.lobes.partial_stack import Array, Mask
 from velatura.inverse.local.approach import FURTHER, LITTLE, step_within
 from velatura.inverse.local.coordinates import SLACK, Bound, Point, Reading, Space, units
 
@@ -22,17 +22,19 @@ ALONG = (1.0, 1e-4)  # weights of the way along the line, beside 1 of what leads
 ROUNDS, ENOUGH, CLOSE = 16, 1e-3, 1e-3  # of steps, the share by which the last gets nearer, and the shortest
 BLURRED = 0.05  # change of a variance in one step, at least
 KEPT = 0.1  # units of coordinates that are kept, as long as others do as well
-EXACT, MET = 1e-6, 1e-9  # by which readings of a slow model, and of one in closed form, may miss their place
+EXACT, QUICK = 1e-6, 2e-3  # by which readings of a slow model may miss their place, at rest and under the hand
+MET = 1e-9  # the same of a model in closed form
 ON_LINE, QUICKLY_ON_LINE = 1e-3, 5e-3  # what an answer may miss the line by, at rest and under the hand
 CHANGED = 1e-4  # by which a wish changes a reading at least, in those units
 DARK, FAINT, SMALL = 1e-3, 1e-4, 0.01  # energies, and variance that is added, for units of readings
 NEARLY, INNER, COARSE = 0.1, 5e-3, 1e-3  # of that, and of the last miss, what the model that is followed may miss
 FOLLOWED, ASTRAY = 0.05, 0.5  # misses that are small, and first ones that lead nowhere
 SLOWLY, NEAR = 0.7, 0.015  # the share of the last miss that is no progress, and misses from which the way goes on
-SEEN, BACK, BEYOND = 0.03, 0.7, 1.25  # of the way that is gone astray: the least that counts, and shares to go, at most
+SEEN, BACK = 0.03, 0.7  # of the way that is gone astray: the least that counts, and the share to go
 FURTHER_ON, ONWARDS, SHORT = 2.0, 0.02, 5e-3  # steps along the line: by an easy last one, anew, and the least
 LANDING, LOWER = 4, 0.01  # readings that lead back to the line, and by how much less is aimed at if they do not
-BENT = 0.5  # by how much corrections are off their slopes, as a share of the square of a distance
+FOLDED = 1 - 1e-3  # the largest variance, folded, that a correction leads to
+BENT, ROUNDED = 0.5, 1e-9  # by how much corrections are off their slopes: share of the square of a distance, and least
 BESIDE = 10.0  # part of the way that it is worth to be as much nearer to the line
 
 
@@ -55,7 +57,7 @@ class Line:
     """The line from a reading `origin` to the reading `goal`, (3 K + V I,), and the stack from which it is looked for.
 
     held: coordinates that keep their values. caps: coordinates that stay below others. enough: by which readings may
-    miss their place on the line, in units of their size.
+    miss their place on the line, in units of their size. known: readings in closed form, by points.
     """
 
     start: Point
@@ -64,6 +66,7 @@ class Line:
     held: Collection[int] = ()
     caps: Sequence[tuple[int, int]] = ()
     enough: float = EXACT
+    known: dict[tuple[bytes, bytes], Reading] = field(default_factory=dict)
 
     def last(self, readings: Sequence[int], whole: bool = False) -> Reached:
         """The last point of the line that has a stack within the bounds.
@@ -71,8 +74,9 @@ class Line:
         Of a model that is slow, the nearest one that adds up layers is followed, corrected by what the two differ by at
         the points that are read (space mapping, Bandler et al. 1994): see `_Search`.
 
-        readings: of a slow model, at most, of one search and of those that go on from where the last one ended. whole:
-        whether only all of the way counts, so that a search ends where it leads astray, or where its end is in sight.
+        readings: of a slow model, at most, of one search and of those that go on from where the last one ended; as many
+        as the first may follow until the point is exact, if that is asked for. whole: whether only all of the way
+        counts, so that a search ends where it leads astray, or where its end is in sight.
         """
         space, x = self.start.space, self.start.x
         if not space.slow:
@@ -84,6 +88,8 @@ class Line:
             search.go(most)
             if search.settled or whole:
                 break
+        if self.enough < QUICK and (search.settled or not whole):
+            search.refine(self, readings[0])
         reached, read = search.best
         found = self._bounded(reached, _Correction.fitted(space, search.read, read))
         return dataclasses.replace(found, settled=search.settled)
@@ -95,7 +101,7 @@ class Line:
     @property
     def allowed(self) -> float:
         """Largest distance from the line that an answer may have."""
-        return QUICKLY_ON_LINE if self.enough > EXACT else ON_LINE
+        return QUICKLY_ON_LINE if self.enough >= QUICK else ON_LINE
 
     def _apart(self, a: Array, b: Array) -> float:
         """The largest difference of two readings."""
@@ -115,11 +121,15 @@ class Line:
         every, free = np.setdiff1d(np.arange(len(x)), held), np.setdiff1d(space.free, [*held, *self._resting])
         kept = np.clip(self.start.x, *box)
         kept[free] = x[free]
-        tried, missing, near = self._descended(space, kept, correction, free, box, ALONG[0], enough)
-        if missing > max(self.enough, enough):
-            tried, missing, near = self._descended(space, x, correction, every, box, ALONG[0], enough)
-        if missing > max(self.enough, enough):
-            tried, missing, near = self._descended(space, tried, correction, every, box, ALONG[1], enough)
+        ends = list[tuple[Array, float, Array]]()
+        for start, moving in ((kept, free), (x, every)):
+            ends.append(self._descended(space, start, correction, moving, box, ALONG[0], enough))
+            if ends[-1][1] <= max(self.enough, enough):
+                return ends[-1][0], ends[-1][2]
+        # What weighs the line leads to several ends; in closed form other searches follow, which look further
+        last = ends if self.start.space.slow else ends[1:]
+        ends = [self._descended(space, start, correction, every, box, ALONG[1], enough) for start, *_ in last]
+        tried, _, near = min(ends, key=lambda end: end[1])
         return tried, near
 
     def _descended(
@@ -159,13 +169,9 @@ class Line:
     def _reading(self, space: Space, x: Array, free: Array) -> Reading:
         """A reading in closed form, which the next search begins with."""
         key = x.tobytes(), free.tobytes()
-        if key not in self._known:
-            self._known[key] = space.reading(x, free)
-        return self._known[key]
-
-    @cached_property
-    def _known(self) -> dict[tuple[bytes, bytes], Reading]:
-        return {}
+        if key not in self.known:
+            self.known[key] = space.reading(x, free)
+        return self.known[key]
 
     def placed(self, value: Array) -> tuple[float, float]:
         """The part of the way of a reading, and what it misses the line by."""
@@ -276,31 +282,40 @@ class _Correction:
     """Difference of a slow model from the one in its place, near a point x: value (R,), and its slopes (R, D).
 
     Readings and coordinates count as logarithms where they are more than `least` (R,) and the unit of coordinates, so
-    that slopes are exponents: of rough facets, readings follow powers of coordinates.
+    that slopes are exponents: of rough facets, readings follow powers of coordinates. Variances are folded before, as
+    those that are read follow those of interfaces less and less. blurs, blurred: which readings and which coordinates
+    these are.
     """
 
     x: Array
     least: Array
+    blurs: Mask
+    blurred: Mask
     value: Array
     slopes: Array
 
     @classmethod
     def none(cls, space: Space, x: Array) -> _Correction:
-        variances = len(space.interfaces) * space.entries
-        least = np.r_[np.full(3 * space.lobes, FAINT), np.full(variances, SMALL)]
-        return cls(x, least, np.zeros_like(least), np.zeros((len(least), len(x))))
+        blurs = np.arange(3 * space.lobes + len(space.interfaces) * space.entries) >= 3 * space.lobes
+        blurred = np.zeros(len(x), bool)
+        for own in space.interfaces:
+            blurred[own.variance] = True
+        least, slopes = np.where(blurs, SMALL, FAINT), np.zeros((len(blurs), len(x)))
+        return cls(x, least, blurs, blurred, slopes.sum(axis=1), slopes)
 
     def value_of(self, x: Array, near: Array) -> Array:
         """The reading `near` at a point, corrected."""
-        more = _logarithms(near, self.least) + self.value + self.slopes @ self._step(x)
-        return np.asarray(np.sign(more) * self.least * np.expm1(np.abs(more)))
+        more = _seen(near, self.least, self.blurs) + self.value + self.slopes @ self._step(x)
+        found = self.least * np.expm1(np.abs(more))
+        folded = np.minimum(found, FOLDED)
+        return np.asarray(np.sign(more) * np.where(self.blurs, folded / (1 - folded), found))
 
     def of(self, x: Array, near: Reading, free: Array) -> Reading:
         """A reading, corrected."""
         value = self.value_of(x, near.value)
-        sizes = np.abs(value) + self.least, np.abs(near.value) + self.least
-        slopes = near.slopes / sizes[1][:, None] + self.slopes[:, free] / units(x[free])
-        return Reading(value, sizes[0][:, None] * slopes)
+        own, other = (_stretch(each, self.least, self.blurs)[:, None] for each in (value, near.value))
+        stretch = _stretch(x, units(0 * x), self.blurred)
+        return Reading(value, (other * near.slopes + self.slopes[:, free] * stretch[free]) / own)
 
     @classmethod
     def fitted(cls, space: Space, read: Sequence[_Read], at: _Read) -> _Correction:
@@ -315,16 +330,16 @@ class _Correction:
         gains = np.array([here._difference(each) - here.value for each in read if each is not at])
         far = np.linalg.norm(steps, axis=1)
         apart = far > 0
-        weights = 1 / (BENT * far[apart, None] ** 2)
+        weights = 1 / (BENT * far[apart, None] ** 2 + ROUNDED)
         rows, right = weights * steps[apart], weights * gains.reshape(-1, len(here.value))[apart]
         slopes = rows.T @ np.linalg.solve(rows @ rows.T + np.eye(len(rows)), right)
         return dataclasses.replace(here, slopes=slopes.T)
 
     def _difference(self, read: _Read) -> Array:
-        return _logarithms(read.value, self.least) - _logarithms(read.near, self.least)
+        return _seen(read.value, self.least, self.blurs) - _seen(read.near, self.least, self.blurs)
 
     def _step(self, x: Array) -> Array:
-        return _logarithms(x, units(0 * x)) - _logarithms(self.x, units(0 * x))
+        return np.asarray(np.subtract(*(_seen(each, units(0 * x), self.blurred) for each in (x, self.x))))
 
 
 @dataclass
@@ -333,12 +348,11 @@ class _Search:
 
     All of the way is aimed at first. Where that leads astray, the search goes back to the last point near the line, and
     aims at a part of the way: by how far it got, then on from there, in steps like the last ones. In the end it leads
-    back to the line. So the first readings are the same, however many may follow.
+    back to the line. All of this is the same for all answers; for an exact one, the search goes on from there.
 
-    read: all points so far. base, best: the last point near the line, and the best one. aim: part of the way. step,
-    end: the length of steps, and the part of the way that none leads beyond. last: what was missed before, infinite of
-    a new aim. landing, stuck: whether it leads back to the line, and whether it has begun anew from where it stood
-    still.
+    read: all points so far. base, best: the last point near the line, and the best one. aim: part of the way. step: the
+    length of steps. last: what was missed before, infinite of a new aim. landing, stuck: whether it leads back to the
+    line, and whether it has begun anew from where it stood still.
     """
 
     line: Line
@@ -349,7 +363,6 @@ class _Search:
     correction: _Correction
     aim: float = 1.0
     step: float = 1.0
-    end: float = 1.0
     last: float = np.inf
     settled: bool = False
     landing: bool = False
@@ -360,18 +373,29 @@ class _Search:
         """The search from the start of a line."""
         space, x, value = line.start.space, line.start.x, line.start.reading.value
         first = _Read(x, value, space.quickly.read(x[:, None])[:, 0])
+        line = dataclasses.replace(line, enough=max(line.enough, QUICK))
         begun = line._reached(x, value), first
         return cls(line, whole, [first], begun, begun, _Correction.fitted(space, [first], first))
 
     def go(self, readings: int) -> None:
         """Read at most so many points, from the best one so far."""
         if len(self.read) > 1:
-            self.base, self.landing, self.step, self.end = self.best, False, ONWARDS, 1.0
+            self.base, self.landing, self.step = self.best, False, ONWARDS
             self._aimed(self.base[1], self.base[0].part + self.step)
         for left in range(readings, 0, -1):
             if not self.landing and self.base[0].part > 0 and (left <= LANDING or self.step < SHORT):
                 self.landing = True
                 self._aimed(self.base[1], self.base[0].part, self.base[0].off)
+            if self._ends():
+                return
+
+    def refine(self, line: Line, readings: int) -> None:
+        """Read at most so many points more, until they miss no more than the line allows."""
+        self.line = line
+        if not self.settled:
+            self.base, self.landing = self.best, True
+            self._aimed(self.base[1], self.base[0].part, self.base[0].off)
+        for _ in range(readings):
             if self._ends():
                 return
 
@@ -411,8 +435,7 @@ class _Search:
             nearer = there.off < max(self.line.allowed, self.last)
             self._aimed(now, self.aim if nearer else self.aim - LOWER, there.off if nearer else np.inf)
         elif astray:
-            known = SEEN < gone < far
-            self.step, self.end = (BACK * gone, base.part + BEYOND * gone) if known else (far / 4, 1.0)
+            self.step = BACK * gone if SEEN < gone < far else far / 4
             self._stepped()
         elif self.aim < 1 and max(missed, there.off, abs(there.part - self.aim)) < NEAR:
             self.step = gone if self.last < np.inf else FURTHER_ON * gone
@@ -422,13 +445,17 @@ class _Search:
             self._aimed(now, self.aim, missed)
 
     def _stepped(self) -> None:
-        """Aim one step further than the base, by half of what is left to an end that is not near."""
-        left = self.end - self.base[0].part
-        if left > 2 * LOWER and self.end < 1:
-            self.step = min(self.step, left / 2)
+        """Aim one step further than the base."""
         self._aimed(self.base[1], self.base[0].part + self.step)
 
 
-def _logarithms(x: Array, least: Array) -> Array:
-    """Numbers of any sign, on a scale that is that of logarithms beyond `least`."""
-    return np.asarray(np.sign(x) * np.log1p(np.abs(x) / least))
+def _seen(x: Array, least: Array, folded: Mask) -> Array:
+    """Numbers of any sign, some of them folded, on a scale that is that of logarithms beyond `least`."""
+    size = np.abs(x)
+    return np.asarray(np.sign(x) * np.log1p(np.where(folded, size / (1 + size), size) / least))
+
+
+def _stretch(x: Array, least: Array, folded: Mask) -> Array:
+    """The derivative of `_seen`."""
+    size = np.abs(x)
+    return np.where(folded, 1 / ((1 + size) * (least + (1 + least) * size)), 1 / (least + size))
