@@ -29,8 +29,8 @@ LIFTED = ("absorption", "colour", "energy", "metal", "blur")  # of which each li
 STEPS = 12  # by which what a reason names is changed
 
 
-def wish(rng: np.random.Generator, most: int = 3) -> Target:
-    """A random target of some lobes, feasible or not."""
+def wish(rng: np.random.Generator, most: int = 3, interfaces: int = 2) -> Target:
+    """A random target of some lobes, of up to so many interfaces each, feasible or not."""
     lobes = []
     count = int(rng.integers(1, most + 1))
     for n in range(count):
@@ -40,7 +40,7 @@ def wish(rng: np.random.Generator, most: int = 3) -> Target:
         lobe: dict[str, object] = {
             "energy": float(energy[0]) if grey else tuple(map(float, energy)),
             "alpha": 0.0 if rng.uniform() < 0.3 else float(rng.uniform(0, 0.6)),
-            "interfaces": int(rng.integers(1, 3)),
+            "interfaces": int(rng.integers(1, interfaces + 1)),
             "base": "conductor" if last and rng.uniform() < 0.5 else "dielectric",
         }
         if rng.uniform() < 0.15:
