@@ -18,7 +18,7 @@ from velatura import kernel, reference
 from velatura.errors import InvalidInput
 from velatura.media.of_material import phase_of
 from velatura.model import MODELS
-from velatura.optics.phase import PhaseFunction
+from velatura.optics.phase import HenyeyGreenstein, PhaseFunction
 from velatura.stack import Material, dumps, load, loads, save
 
 TABLE = {"table": [[0, 10], [20, 3], [100, 0], [150, 0], [180, 0.4]]}
@@ -63,6 +63,39 @@ def test_a_phase_function_is_a_distribution_that_its_samples_have(phase: Any) ->
     np.testing.assert_allclose(np.interp(np.sort(found.sample(u)), cosines, below), u, atol=1.001e-3)
     for angle in (0.05, 0.2, 2.0):
         assert found.within(angle) == pytest.approx(1 - np.interp(np.cos(angle), cosines, below), abs=1e-5)
+
+
+def test_a_needle_is_finite_in_single_precision_either_way() -> None:
+    """Expected: cosines are drawn as in double precision, to 2e-6, within -1 to 1 but for rounding; densities at them,
+    and where rounding has a cosine beyond 1, are finite, and both are those of the opposite asymmetry turned round."""
+    kernel.require_llvm()
+    import drjit.llvm as types
+
+    u = np.linspace(0, 1, 1000, endpoint=False, dtype=np.float32)
+    for g in (0.9, 0.999, 0.99995):
+        ahead, back = HenyeyGreenstein(g), HenyeyGreenstein(-g)
+        cosine = ahead.sample(types.Float(u)).numpy()
+        np.testing.assert_allclose(cosine, ahead.sample(u.astype(float)), atol=2e-6)
+        assert np.abs(cosine).max() < 1 + 3e-7
+        turned = -back.sample(types.Float(1 - u)).numpy()
+        np.testing.assert_allclose(turned, cosine, atol=4e-6)
+        most = np.append(cosine, np.float32([-1.0000002, 1.0000002]))
+        density = ahead.density(types.Float(most)).numpy()
+        assert np.isfinite(density).all() and (density > 0).all()
+        np.testing.assert_array_equal(back.density(types.Float(-most)).numpy(), density)
+
+
+def test_a_medium_of_needles_is_seen_from_below() -> None:
+    """Values, and samples with their weights, are finite; NaN and infinity came of what is lost to rounding."""
+    mi = kernel.mitsuba("llvm_ad_rgb")
+    needle = vt.Medium(depth=3.5, sigma_s=9.8, g=-0.99995)
+    bsdf = vt.bsdf(vt.Stack([vt.Interface(eta=2.4, alpha=0.9), needle, vt.Interface(eta=2.4)]))
+    si = mi.SurfaceInteraction3f()
+    si.wi = mi.Vector3f(0.51**0.5, 0, -0.7)
+    u = mi.Float(np.linspace(0, 0.999, 200))
+    sample, weight = bsdf.sample(mi.BSDFContext(), si, u, mi.Point2f(u, 0.3))
+    value = bsdf.eval(mi.BSDFContext(), si, sample.wo)
+    assert all(np.isfinite(np.array(found)).all() for found in (sample.wo, sample.pdf, weight, value))
 
 
 @pytest.mark.parametrize("phase", PHASES.values(), ids=PHASES)

@@ -38,7 +38,7 @@ class PhaseFunction(ABC):
     def key(self) -> Hashable:
         """Equal for phase functions of numbers that are the same."""
 
-    def widened(self, g: float) -> tuple[PhaseFunction, float]:
+    def widened(self, g: float) -> tuple[PhaseFunction, Value]:
         """The phase function with no lobe narrower than of asymmetry g; and the share of scattered light that it is
         for, all other light going straight on (van de Hulst's similarity relation)."""
         return self, 1.0
@@ -77,9 +77,9 @@ class HenyeyGreenstein(PhaseFunction):
     def key(self) -> Hashable:
         return type(self), float(self.g)
 
-    def widened(self, g: float) -> tuple[PhaseFunction, float]:
-        bounded = min(max(self.g, -g), g)
-        return HenyeyGreenstein(bounded), min((1 - self.g) / (1 - bounded), 1.0)
+    def widened(self, g: float) -> tuple[PhaseFunction, Value]:
+        bounded = ops.clip(self.g, -g, g)
+        return HenyeyGreenstein(bounded), ops.minimum((1 - self.g) / (1 - bounded), 1.0)
 
 
 @dataclass(frozen=True)
@@ -105,7 +105,7 @@ class TwoLobes(PhaseFunction):
     def key(self) -> Hashable:
         return type(self), self.first.key, self.second.key, self.share
 
-    def widened(self, g: float) -> tuple[PhaseFunction, float]:
+    def widened(self, g: float) -> tuple[PhaseFunction, Value]:
         (first, of_first), (second, of_second) = self.first.widened(g), self.second.widened(g)
         assert isinstance(first, HenyeyGreenstein) and isinstance(second, HenyeyGreenstein)
         left = self.share * of_first + (1 - self.share) * of_second
@@ -163,7 +163,9 @@ class _Either(PhaseFunction):
 
 def henyey_greenstein(cos_theta: Value, g: Value) -> Value:
     """Density per solid angle, in 1/sr, for asymmetry g in (-1, 1)."""
-    d = (1 - g) * (1 - g) + 2 * g * (1 - cos_theta)
+    side = ops.select(g < 0, -1.0, 1.0)  # of the peak, about which rounding may have cosines beyond 1
+    size = side * g
+    d = (1 - size) * (1 - size) + 2 * size * ops.maximum(1 - side * cos_theta, 0.0)
     return (1 - g * g) / (4 * pi * d * ops.sqrt(d))
 
 
@@ -176,12 +178,13 @@ def forwards(g: Value) -> Value:
 def sample_henyey_greenstein(g: Value, u: Value) -> Value:
     """Cosine drawn from the phase function by a uniform u in [0, 1).
 
-    The distribution function's inverse, (1 + g^2 - ((1-g^2)/(1+g s))^2) / (2g) with s = 2u-1, multiplied out so that
-    the division by g cancels.
+    The distribution function's inverse, (1 + g^2 - ((1-g^2)/(1+g s))^2) / (2g) with s = 2u-1, multiplied out: the
+    division by g cancels, and all that is subtracted from the cosine of the peak is positive.
     """
-    s = 2 * u - 1
-    d = 1 + g * s
-    return (s + 0.5 * g * (3 + s * s) + g * g * s - 0.5 * g * g * g * (1 - s * s)) / (d * d)
+    side, v = ops.select(g < 0, -1.0, 1.0), ops.select(g < 0, 1 - u, u)
+    size = side * g
+    d = 1 - size + 2 * size * v  # 1 + g s
+    return side * (1 - (1 - size) * (1 - size) * (1 - v) * (1 + size + d) / (d * d))
 
 
 def tangents(w: Direction) -> tuple[Direction, Direction]:

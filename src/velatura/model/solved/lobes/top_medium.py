@@ -30,6 +30,7 @@ from numpy.typing import NDArray
 
 from velatura import ops
 from velatura.model.solved.energies.media import ORDERS, escaping, passing, power
+from velatura.model.solved.guards import G_MAX
 from velatura.model.solved.lobes.remainder import Remainder, RemainderSamples, grazing
 from velatura.ops import Value
 from velatura.optics import ggx
@@ -56,8 +57,11 @@ class TopMedium(ops.NamedFields):
 
     @classmethod
     def of(cls: type[Medium], layer: SlabValues | None, phase: PhaseFunction, shares: Sequence[Value]) -> Medium:
-        """A medium in any dialect; without one, one that scatters nothing."""
-        wider = tuple(HenyeyGreenstein(power(layer.g, n) if layer else 0.0) for n in ORDERS)
+        """A medium in any dialect; without one, one that scatters nothing. No lobe is narrower than single precision
+        and nodes resolve."""
+        g = ops.clip(layer.g, -G_MAX, G_MAX) if layer else 0.0
+        wider = tuple(HenyeyGreenstein(power(g, n)) for n in ORDERS)
+        phase, _ = phase.widened(G_MAX)
         if layer is None:
             return cls(0.0, 1.0, phase, wider, tuple(shares))
         depth = layer.tau_a + layer.tau_s
