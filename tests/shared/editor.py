@@ -111,6 +111,9 @@ WRITES_NO_MORE = """() => {
 }"""
 
 
+POLLING = 50  # milliseconds
+
+
 class Visit:
     """A page of the editor, with what its console has complained about; a slow machine has its time."""
 
@@ -152,7 +155,7 @@ class Visit:
 
     def ready(self) -> None:
         """Wait until there is a picture: the preview, which is the same every time."""
-        self.page.wait_for_function("() => window.velatura?.viewport.slots.a.shader && velatura.viewport.previewed")
+        self._wait_for("window.velatura?.viewport.slots.a.shader && velatura.viewport.previewed")
 
     def told(self) -> str:
         """The state of the page, for the report of a failed test."""
@@ -173,8 +176,11 @@ class Visit:
     def settled(self) -> None:
         """Wait until Python has been asked, has answered, and what it said is drawn."""
         self.page.wait_for_timeout(300)
-        drawn = "({ quiet, viewport }) => quiet && !viewport.held && viewport.previewed"
-        self.page.wait_for_function(f"() => ({drawn})(window.velatura)")
+        self._wait_for("velatura.quiet && !velatura.viewport.held && velatura.viewport.previewed")
+
+    def _wait_for(self, condition: str) -> None:
+        """Looks now and then, since a look in every frame makes the page compose frames."""
+        self.page.wait_for_function(f"() => {condition}", polling=POLLING)
 
     def drop(self, *files: tuple[str, str | bytes], text: str = "") -> None:
         """Drop files, or text, on the picture."""

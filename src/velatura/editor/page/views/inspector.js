@@ -19,6 +19,7 @@ const TABS = [
   { name: 'blur', title: 'Blur' },
   { name: 'validations', title: 'Validations' },
 ];
+const INTERVAL = 30; // milliseconds between looks for changes
 const PAUSE = 200; // milliseconds after a preview, in which nothing may change before plots are made
 const CHANNELS = ['red', 'green', 'blue'];
 
@@ -36,7 +37,7 @@ export function mountInspector(element, { store, session, viewport, call, lacks,
   const changed = { a: true, b: true };
   let problem = '';
   let stale = true;
-  let frame = requestAnimationFrame(follow);
+  let timer = setTimeout(follow);
   const validations = createValidations({ call, store, session }, paint);
   const stops = [store.subscribe(paint), onLobes((name) => name in changed && (changed[name] = true))];
 
@@ -65,9 +66,9 @@ export function mountInspector(element, { store, session, viewport, call, lacks,
     store.run(setView, { lobe: store.get().view.lobe === number ? null : number });
   };
 
-  /** Draws changes, in every frame in which it is visible. */
+  /** Draws changes while it is visible. Not in every frame: a page that asks for frames is composed in each of them. */
   function follow() {
-    frame = requestAnimationFrame(follow);
+    timer = setTimeout(follow, INTERVAL);
     if (!element.checkVisibility()) return;
     if (local.tab !== 'validations') slice();
     if (stale) render(page(), element);
@@ -405,7 +406,7 @@ export function mountInspector(element, { store, session, viewport, call, lacks,
 
   return {
     destroy() {
-      cancelAnimationFrame(frame);
+      clearTimeout(timer);
       stops.forEach((stop) => stop());
       Object.values(slices).forEach((made) => made?.dispose());
       render(nothing, element);
