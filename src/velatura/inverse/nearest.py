@@ -29,6 +29,7 @@ UNLIKE = 1e-3  # energy or variance by which a stack differs from the nearest th
 HALVINGS = 6  # of the way that is left, where other searches are looked at
 DIMMED = 0.7  # share of the energy of a lobe that it has in any case if it is blurred more
 LEAST = 1e-3  # part of the way that is no change
+BEYOND = 0.05  # parts of the way by which models differ
 ROUNDED = 1e-3  # share of an energy by which a wish may be off, that is not worth a word
 
 
@@ -78,7 +79,7 @@ def nearest(present: DraggedStack, wish: Target, now: Target | None = None, quic
     found, bound, part, settled = _along(present, now, possible, quick)
     if bound is not None and (other := _elsewhere(present, possible, quick)) is not None:
         found, bound, part = other, None, 1.0
-    if bound is not None and present.space.slow and (present.smooth or part < LEAST):
+    if bound is not None and present.space.slow:
         found, bound, part = _by_closed_form(present, now, possible, part, quick) or (found, bound, part)
     if bound is not None and (not present.space.slow or not (settled or part >= LEAST)):
         found, bound, part = _further(present, now, possible, found, bound, part, quick)
@@ -181,9 +182,10 @@ def _by_closed_form(
     present: DraggedStack, now: Target, wish: Target, least: float, quick: bool
 ) -> tuple[DraggedStack, Bound | None, float] | None:
     """The same of a slow model as `_along`, from the answer of the nearest one that adds up layers; None unless that
-    leads further than a part of the way."""
+    leads further than a part of the way. Where that is a way, the answer must lie well beyond it: by an index on the
+    other side of that above, which no line leads to."""
     near = nearest(present.quickly, wish)
-    further = near.part >= max(LEAST, least)
+    further = near.part >= max(LEAST, least + (0 if present.smooth or least < LEAST else BEYOND))
     fresh = DraggedStack.of(near.stack.stack, wish, present.model, with_pins=True) if further else None
     if fresh is None:
         return None
