@@ -19,7 +19,8 @@ from velatura.inverse.local.approach import FURTHER, LITTLE, step_within
 from velatura.inverse.local.coordinates import SLACK, Bound, Point, Reading, Space, units
 
 ALONG = (1.0, 1e-4)  # weights of the way along the line, beside 1 of what leads off it: at first, and in the end
-ROUNDS, ENOUGH, CLOSE = 16, 1e-3, 1e-3  # of steps, the share by which the last gets nearer, and the shortest
+ROUNDS, CLOSE = 16, 1e-3  # of steps, and the shortest
+ENOUGH, HARDLY = 1e-3, 0.1  # the share by which the last step gets nearer: of all coordinates, and while some are kept
 BLURRED = 0.05  # change of a variance in one step, at least
 KEPT = 0.1  # units of coordinates that are kept, as long as others do as well
 EXACT, QUICK = 1e-6, 2e-3  # by which readings of a slow model may miss their place, at rest and under the hand
@@ -122,8 +123,8 @@ class Line:
         kept = np.clip(self.start.x, *box)
         kept[free] = x[free]
         ends = list[tuple[Array, float, Array]]()
-        for start, moving in ((kept, free), (x, every)):
-            ends.append(self._descended(space, start, correction, moving, box, ALONG[0], enough))
+        for start, moving, least in ((kept, free, HARDLY), (x, every, ENOUGH)):
+            ends.append(self._descended(space, start, correction, moving, box, ALONG[0], enough, least))
             if ends[-1][1] <= max(self.enough, enough):
                 return ends[-1][0], ends[-1][2]
         # What weighs the line leads to several ends; in closed form other searches follow, which look further
@@ -141,9 +142,10 @@ class Line:
         box: tuple[Array, Array],
         along: float,
         enough: float,
+        least: float = ENOUGH,
     ) -> tuple[Array, float, Array]:
         """The nearest point by weighted squares, what it misses, and its reading without correction: Gauss-Newton
-        within the bounds."""
+        within the bounds, as long as a step gets nearer by a share of at least `least`."""
         near = self._reading(space, x, free)
         reading, rows, reach = correction.of(x, near, free), self._rows(along), 1.0
         off = float(np.linalg.norm(rows @ (self.goal - reading.value)))
@@ -156,7 +158,7 @@ class Line:
             there = self._reading(space, tried, free)
             corrected = correction.of(tried, there, free)
             nearer = float(np.linalg.norm(rows @ (self.goal - corrected.value)))
-            ends = nearer > (1 - ENOUGH) * off
+            ends = nearer > (1 - least) * off
             if nearer < off:
                 x, near, reading, off, reach = tried, there, corrected, nearer, min(1.0, 2 * reach)
             else:
