@@ -406,6 +406,7 @@ def test_small_pictures_lead_to_members(visit: Open) -> None:
           return pictures.length === 5 && pictures.every(Boolean) && pictures;
         }""",
         timeout=60_000,
+        polling=500,
     ).json_value()
     assert len(set(drawn)) == 5
     before = lobes(page).energy
