@@ -9,7 +9,7 @@ likelihood does, for which a tail is all. `fitted` runs for all nodes at once, b
 
 from __future__ import annotations
 
-from collections.abc import Collection
+from collections.abc import Collection, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -37,17 +37,27 @@ def density(versine: Array, alpha: Array) -> Array:
     return np.maximum(1 - versine, 0) / (below + slope * versine) ** 2 / (2 * np.pi * whole)
 
 
+def alone(blurs: Array, sine: Array, w: Array) -> Array:
+    """Density of a blur at each node, of (nodes, 4), in directions (3, nodes, samples)."""
+    x, y, root, _ = blurs.T
+    across = np.stack([x - sine, y])
+    z = np.sqrt(np.maximum(1 - (across**2).sum(axis=0), 0))
+    first, *others = (each - towards[:, None] for each, towards in zip(w, [*across, z]))
+    versine = first * first
+    for apart in others:
+        versine += apart * apart
+    versine *= 0.5
+    return density(versine, root[:, None] ** 2)
+
+
 def mixed(blurs: Array, sine: Array, w: Array) -> Array:
     """Density of blurs (nodes, K, 4) in directions (3, nodes, samples)."""
-    found = np.zeros(w.shape[1:])
-    for k in range(blurs.shape[1]):
-        x, y, root, share = blurs[:, k].T
-        across = np.stack([x - sine, y])
-        z = np.sqrt(np.maximum(1 - (across**2).sum(axis=0), 0))
-        towards = np.stack([*across, z])[..., None]
-        versine = 0.5 * ((w - towards) ** 2).sum(axis=0)
-        found = found + share[:, None] * density(versine, root[:, None] ** 2)
-    return found
+    return _sum([alone(blurs[:, k], sine, w) for k in range(blurs.shape[1])], blurs)
+
+
+def _sum(densities: Sequence[Array], blurs: Array) -> Array:
+    """The densities of blurs, each by its share."""
+    return np.asarray(sum(share[:, None] * each for share, each in zip(blurs[..., 3].T, densities)))
 
 
 def distance(found: Array, sine: Array, w: Array, ratio: Array, sampled: Array) -> Array:
@@ -88,9 +98,11 @@ def fitted(start: Array, sine: Array, w: Array, ratio: Array, sampled: Array, ke
         kept: which of the four numbers stay as they begin.
     """
     nodes, count, _ = start.shape
-    root = np.sqrt(ratio / ratio.shape[1])
     drawn = sampled > 0
+    root = np.where(drawn, np.sqrt(ratio / ratio.shape[1]), 0)
     per = np.where(drawn, 1 / np.sqrt(np.where(drawn, sampled, 1) * ratio.shape[1]), 0)
+    if count == 1:
+        kept = {*kept, 3}  # all of it
     free = [k for k in range(4 * count) if k % 4 not in kept]
 
     def bounded(x: Array) -> Array:
@@ -110,24 +122,37 @@ def fitted(start: Array, sine: Array, w: Array, ratio: Array, sampled: Array, ke
     scale[..., :2] = start[..., 2:3] ** 2  # places in units of the width, so that steps are of one size
     first, scale = (each.reshape(nodes, -1)[:, free] for each in (start, scale))
 
-    def residual(x: Array) -> Array:
-        near = np.sqrt(mixed(bounded(x), sine, w)) * per - root
-        return np.concatenate([np.where(drawn, near, 0), TIED * (x - first) / scale], axis=1)
+    def densities(found: Array) -> list[Array]:
+        return [alone(found[:, k], sine, w) for k in range(count)]
 
-    x, now = first, residual(first)
+    def residual(x: Array, found: Array, seen: Sequence[Array]) -> Array:
+        return np.concatenate([np.sqrt(_sum(seen, found)) * per - root, TIED * (x - first) / scale], axis=1)
+
+    def moved(number: int) -> Array:
+        """The residual where one number is another, which changes the density of its own blur alone, or a share."""
+        step = np.where(np.arange(len(free)) == number, x + STEP * scale, x)
+        found, (k, kind) = bounded(step), divmod(free[number], 4)
+        changed = [*seen]
+        if kind < 3:
+            changed[k] = alone(found[:, k], sine, w)
+        return residual(step, found, changed)
+
+    x = first
+    seen = densities(bounded(x))
+    now = residual(x, bounded(x), seen)
     error = (now**2).sum(axis=1)
     damping = np.full(nodes, DAMPING)
     for _ in range(STEPS):
-        moved = [np.where(np.arange(len(free)) == k, x + STEP * scale, x) for k in range(len(free))]
-        slope = np.stack([(residual(each) - now) / STEP for each in moved], axis=-1)
-        across = slope.transpose(0, 2, 1)
-        normal = across @ slope
+        slope = np.stack([(moved(number) - now) / STEP for number in range(len(free))], axis=1)
+        normal = slope @ slope.transpose(0, 2, 1)
         normal += (damping[:, None] * (np.einsum("nii->ni", normal) + 1e-6))[..., None] * np.eye(len(free))
-        step = np.linalg.solve(normal, -(across @ now[..., None]))[..., 0]
+        step = np.linalg.solve(normal, -(slope @ now[..., None]))[..., 0]
         tried = x + np.clip(step, -1, 1) * scale
-        then = residual(tried)
+        seen_then = densities(bounded(tried))
+        then = residual(tried, bounded(tried), seen_then)
         better = (then**2).sum(axis=1) < error
         x, now = np.where(better[:, None], tried, x), np.where(better[:, None], then, now)
+        seen = [np.where(better[:, None], *each) for each in zip(seen_then, seen)]
         error = (now**2).sum(axis=1)
         damping = np.where(better, damping / 3, damping * 4)
     return bounded(x)

@@ -11,6 +11,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from math import prod, radians
 from typing import Any
 
@@ -68,12 +69,13 @@ def prefiltered(material: Material, model: Model) -> Prefiltered:
     x, y = sine * np.cos(turn + phi), sine * np.sin(turn + phi)
     body = model.body(material, variance_kind(material), Context())
     count = len(model.statistics(material, (x[:1], y[:1], z[:1])).energy)
-    sides = [1.0, -1.0] if material.transmits else [1.0]
+    sides = [(x, y, side * z) for side in ([1.0, -1.0] if material.transmits else [1.0])]
+    seen = [(body.at_direction(_repeated(wi)), wi) for wi in sides]
 
     def of(lobes: frozenset[int]) -> _Light:
         reflected = Query([k in lobes for k in range(count + 1)], False)
         asked = reflected if lobes else Query(False, True, radiance=False)
-        return _Light(lobes, [_Part.of(body, (x, y, side * z), phi, asked) for side in sides])
+        return _Light(lobes, [_Part.of(body, wi, phi, asked) for body, wi in seen])
 
     reflected = [of(frozenset([k])) for k in range(count + 1)]
     passed = [of(frozenset())] if material.transmits else []
@@ -81,6 +83,12 @@ def prefiltered(material: Material, model: Model) -> Prefiltered:
     kept = [*kept, *(each for each in passed if each.energy > FAINT)] or reflected[:1]
     energy = np.stack([np.stack([side.energy for side in each.sides]) for each in kept], axis=2)
     return Prefiltered(energy, _shared(kept), shape, [not each.lobes for each in kept], turn)
+
+
+def _repeated(wi: Direction) -> Direction:
+    """Directions at nodes, each as often as there are samples."""
+    x, y, z = (repeated(each, SAMPLES) for each in wi)
+    return x, y, z
 
 
 def _across(material: Material) -> float:
@@ -98,7 +106,7 @@ def _joined(lights: Sequence[_Light], of: Callable[[frozenset[int]], _Light]) ->
     """Light of lobes, of which the faintest joins others as long as one blur is nearly as good for both."""
 
     def farther(one: _Light, other: _Light, both: _Light) -> float:
-        found = [each.blurs(1) for each in (both, one, other)]
+        found = [each.blur for each in (both, one, other)]
         widths = np.maximum(_alphas(found[1]), _alphas(found[2]))
         missed = [each.missed(blurs, widths) for each, blurs in zip((both, one, other), found)]
         return missed[0] - missed[1] - missed[2]
@@ -116,7 +124,7 @@ def _joined(lights: Sequence[_Light], of: Callable[[frozenset[int]], _Light]) ->
 
 def _shared(lights: Sequence[_Light]) -> list[Array]:
     """The blurs of each: one, and further ones where most is missed."""
-    found = [light.blurs(1) for light in lights]
+    found = [light.blur for light in lights]
     for _ in range(MOST - len(lights)):
         missed = [light.missed(blurs, _alphas(blurs)) for light, blurs in zip(lights, found)]
         worst = int(np.argmax(missed))
@@ -143,6 +151,11 @@ class _Light:
     def energy(self) -> float:
         """The most of its energy."""
         return max(float(np.max(side.energy)) for side in self.sides)
+
+    @cached_property
+    def blur(self) -> Array:
+        """One blur (sides, nodes, 1, 4)."""
+        return self.blurs(1)
 
     def blurs(self, count: int) -> Array:
         """So many blurs (sides, nodes, count, 4)."""
@@ -172,9 +185,8 @@ class _Part:
     @classmethod
     def of(cls, body: Body, wi: Direction, phi: Array, asked: Query) -> _Part:
         nodes = len(wi[0])
-        u = at_nodes(nodes, SAMPLES)
-        repeat = tuple(repeated(x, SAMPLES) for x in wi)
-        wo, _ = body.sample(repeat, *u, asked)
+        repeat = _repeated(wi)
+        wo, _ = body.sample(repeat, *at_nodes(nodes, SAMPLES), asked)
         value, density = body.eval_pdf(repeat, wo, asked)
         weight = np.where(density > 0, value / np.where(density > 0, density, 1), 0)
         weight = np.broadcast_to(weight, (3, nodes * SAMPLES)).reshape(3, nodes, SAMPLES)
