@@ -35,7 +35,7 @@ from velatura.editor import server
 from velatura.errors import Incomplete
 from velatura.inverse.lobes.target import FURTHER
 from velatura.programs import fit
-from velatura.shader import closures
+from velatura.shader import closures, prefiltered
 from velatura.sweeps import run as sweeping
 
 Run = Callable[..., tuple[int, str, str]]
@@ -197,6 +197,9 @@ NUMBERS: list[tuple[Any, str, Any]] = [
     (cost, "POWER", 12),
     (cost, "TURNS", 3),
     (closures, "PLANE", (16, 9)),
+    (prefiltered, "SAMPLES", 64),
+    (prefiltered, "LINE", (16,)),
+    (prefiltered, "PLANE", (8, 5)),
     (fit, "NODES", 40),
     (fit, "AZIMUTHS", (0.0,)),
     (fit, "STEPS", 1),
