@@ -128,10 +128,7 @@ class _Channel:
             shape = len(cosines), len(wavelengths_nm)
             return np.stack([np.broadcast_to(getattr(found, name), shape) for name in names])
 
-        blocks = [cosines[k : k + TOGETHER] for k in range(0, len(cosines), TOGETHER)]
-        return np.concatenate(
-            [integrated(over, block.astype(number), thickness_nm, sensitivity, most) for block in blocks], axis=-1
-        )
+        return integrated(over, cosines.astype(number), thickness_nm, sensitivity, most)
 
 
 def integrated(
@@ -151,15 +148,21 @@ def integrated(
     count = min(_intervals(thickness_nm, PER_PERIOD), most // 4)
     step = (high - low) / count
     total, whole = _summed(shares, cosines, low + step * np.arange(1, count), sensitivity)
-    settled = 0
-    while True:
-        more, more_whole = _summed(shares, cosines, low + step * (np.arange(count) + 0.5), sensitivity)
+    found = np.empty_like(total)
+    left, settled = np.arange(len(cosines)), np.zeros(len(cosines), int)
+    while len(left):
+        more, more_whole = _summed(shares, cosines[left], low + step * (np.arange(count) + 0.5), sensitivity)
         before, total, whole = total / whole, total + more, whole + more_whole
         count, step = 2 * count, 0.5 * step
-        settled = settled + 1 if np.abs(total / whole - before).max() < CONVERGED else 0
+        now = total / whole
+        first = np.flatnonzero(np.diff(left // TOGETHER, prepend=-1))
+        change = np.maximum.reduceat(np.abs(now - before).max(axis=(0, 1)), first)
+        settled = np.where(np.repeat(change, np.diff(first, append=len(left))) < CONVERGED, settled + 1, 0)
         # Twice, since harmonics that a step and its half both take for the mean change nothing
-        if settled == 2 or 2 * count > most:
-            return np.asarray(total / whole)
+        done = (settled == 2) | (2 * count > most)
+        found[..., left[done]] = now[..., done]
+        left, total, settled = left[~done], total[..., ~done], settled[~done]
+    return found
 
 
 def quadrature(thickness_nm: float, sensitivity: Sensitivity) -> tuple[Array, Array]:
