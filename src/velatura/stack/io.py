@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import json
 import os
 from collections.abc import Callable, Iterable, Mapping
@@ -137,6 +138,11 @@ def preset(name: str) -> Loaded:
     if name not in presets():
         unknown_name = unknown("preset", name, presets(), "`velatura presets` lists all")
         raise InvalidInput(f"{unknown_name}; a material file ends in {', '.join(ENDINGS)}")
+    return _preset(name)
+
+
+@functools.cache
+def _preset(name: str) -> Loaded:
     text = (_PRESETS / f"{name}.yaml").read_text(encoding="utf-8")
     return loads(text, name=f"{name}.yaml", folder=str(_PRESETS))
 
