@@ -33,6 +33,7 @@ from velatura.cli import app
 from velatura.comparison import evaluated_lobes, pictures, plugins
 from velatura.editor import server
 from velatura.errors import Incomplete
+from velatura.inverse.fitting import descent
 from velatura.inverse.lobes.target import FURTHER
 from velatura.programs import fit
 from velatura.shader import closures, prefiltered
@@ -185,10 +186,12 @@ LESS = {"spp": 2, "size": (8, 8), "paths": 1000, "count": 2}
 FEWER: list[tuple[Any, str, dict[str, Any]]] = [
     (api, "render", LESS),
     (comparison, "compare", {**LESS, "cos_theta": (0.7,), "models": lambda given: given or [QUICK]}),
-    *((inverse, name, {**LESS, "model": QUICK}) for name in ("invert_stack", "alternatives", "fit_target", "simplify")),
+    *((inverse, name, {**LESS, "model": QUICK}) for name in ("invert_stack", "alternatives", "simplify")),
+    (inverse, "fit_target", {"starts": 1, "model": QUICK}),
+    (inverse, "answers", LESS),
     (inverse, "coat", {"model": QUICK}),
 ]
-# Of what no page asks for: samples, and directions of fits
+# Of what no page asks for: samples, and directions and steps of fits
 NUMBERS: list[tuple[Any, str, Any]] = [
     *((module, "SAMPLES", 2**14) for module in (evaluated_lobes, plugins)),
     (evaluated_lobes, "LIT_SAMPLES", 2**14),
@@ -197,6 +200,7 @@ NUMBERS: list[tuple[Any, str, Any]] = [
     (cost, "POWER", 12),
     (cost, "TURNS", 3),
     (closures, "PLANE", (16, 9)),
+    (descent, "ROUNDS", 4),
     (prefiltered, "SAMPLES", 64),
     (prefiltered, "LINE", (16,)),
     (prefiltered, "PLANE", (8, 5)),
@@ -325,9 +329,9 @@ def sentences(command: str) -> list[tuple[str, str, str]]:
 def test_commands_in_sentences_exist() -> None:
     said = sentences(r"(velatura) ([^`]+)")
     assert len(said) > 20
+    program = typer.main.get_command(app)
     for page, _, command in said:
-        words = shlex.split(command)
-        verb = typer.main.get_command(app)
+        words, verb = shlex.split(command), program
         while words and hasattr(verb, "commands"):
             assert words[0] in verb.commands, f"{page}: no such verb: velatura {command}"
             verb = verb.commands[words.pop(0)]
