@@ -31,6 +31,7 @@ COAT: dict[str, Any] = {
     "name": "Coat",
     "layers": [{"interface": {"eta": 1.5, "alpha": 0.1}}, {"interface": {"conductor": "Au"}}],
 }
+MATT: dict[str, Any] = {"name": "Matt", "layers": [{"diffuse": {"albedo": [0.2, 0.5, 0.3]}}]}
 PIXEL = base64.b64decode(
     "iVBORw0KGgoAAAANSUhEUgAAAAEAAAABCAYAAAAfFcSJAAAADUlEQVR42mNk+M9QDwADhgGAWjR9awAAAABJRU5ErkJggg=="
 )
@@ -58,10 +59,13 @@ def changed(**keys: Any) -> dict[str, Any]:
 
 @pytest.mark.parametrize("to", [name for name, each in FORMATS.items() if each.is_text])
 def test_a_material_is_exported_as_the_command_line_does(to: str) -> None:
-    for fixed in (False, True):
-        answer = VERBS["export"]({"material": COAT, "to": to, "fixed": fixed, "model": "realtime"})
-        constant = ["all"] if fixed and "constant" in FORMATS[to].options else []
-        made = export(Stack.from_dict(COAT), to, "realtime", constant=constant, folder=".")
+    """A coat as code, and what takes no constants, of which much is fitted, of a matt base; `fixed` changes nothing."""
+    takes_constants = "constant" in FORMATS[to].options
+    material = COAT if takes_constants else MATT
+    for fixed in (False, True) if takes_constants else (True,):
+        answer = VERBS["export"]({"material": material, "to": to, "fixed": fixed, "model": "realtime"})
+        constant = ["all"] if fixed and takes_constants else []
+        made = export(Stack.from_dict(material), to, "realtime", constant=constant, folder=".")
         assert answer["text"] == made.text
         assert {ending: decoded(data).tobytes() for ending, data in answer["beside"].items()} == dict(made.beside)
         assert answer["ending"] == FORMATS[to].endings[0]
@@ -274,7 +278,7 @@ def test_a_drag_takes_over_the_layers_that_it_leaves_alone() -> None:
         solution = VERBS["values"]({"material": changed(alpha=[alpha, 0.2]), "coarse": True})["solution"]
         return decoded(solution["texels"])
 
-    alphas = (0.1, 0.15, 0.2)
+    alphas = (0.1, 0.15)
     answers = [dragged(alpha) for alpha in alphas]
     for alpha, answer in zip(alphas, answers):
         KEPT.clear()
@@ -341,7 +345,7 @@ def test_tables_are_those_that_are_read(here: Path) -> None:
 def test_a_thickness_from_a_texture_has_a_table(here: Path) -> None:
     """Of the second of two films, whose image the code reads; tables are those that the code looks up."""
     (here / "pixel.png").write_bytes(PIXEL)
-    films = [{"eta": 1.4, "thickness_nm": 50}, {"eta": 1.9, "thickness_nm": {"texture": "pixel.png", "scale": 300}}]
+    films = [{"eta": 1.4, "thickness_nm": 50}, {"eta": 1.9, "thickness_nm": {"texture": "pixel.png", "scale": 60}}]
     made = shader(changed(films=films))
     (name,) = made["films"]
     number, places = name.split("_by")
