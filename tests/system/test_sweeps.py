@@ -73,8 +73,8 @@ def expected(tmp_path_factory: pytest.TempPathFactory) -> Any:
 
 
 @contextlib.contextmanager
-def cluster(folder: Path) -> Iterator[tuple[str, list[subprocess.Popen[bytes]]]]:
-    """The address of a scheduler, and its process before those of two workers."""
+def cluster(folder: Path, workers: int) -> Iterator[tuple[str, list[subprocess.Popen[bytes]]]]:
+    """The address of a scheduler, and its process before those of workers."""
     started = list[subprocess.Popen[bytes]]()
 
     def start(*arguments: str) -> None:
@@ -89,7 +89,7 @@ def cluster(folder: Path) -> Iterator[tuple[str, list[subprocess.Popen[bytes]]]]
     try:
         start("scheduler", "--host", "127.0.0.1", "--port", "0", "--no-dashboard")
         at = wait_for(address)
-        for _ in range(2):
+        for _ in range(workers):
             start("worker", at, "--no-nanny", "--nthreads", "1", "--no-dashboard")
         yield at, started
     finally:
@@ -101,7 +101,7 @@ def cluster(folder: Path) -> Iterator[tuple[str, list[subprocess.Popen[bytes]]]]
 @pytest.fixture(scope="module")
 def dask(tmp_path_factory: pytest.TempPathFactory) -> Iterator[tuple[str, list[subprocess.Popen[bytes]]]]:
     """The address of a scheduler, and two workers."""
-    with cluster(tmp_path_factory.mktemp("dask")) as (address, (_, *workers)):
+    with cluster(tmp_path_factory.mktemp("dask"), 2) as (address, (_, *workers)):
         yield address, workers
 
 
@@ -144,10 +144,10 @@ def test_a_scheduler_that_dies_ends_the_sweep_in_one_line(
 ) -> None:
     """Expected: an error that says how to go on, nothing printed, no worker left, and by other processes equal data."""
     store = tmp_path / "points.zarr"
-    with cluster(tmp_path) as (address, (scheduler, *workers)):
+    with cluster(tmp_path, 1) as (address, (scheduler, worker)):
         with pytest.raises(vt.VelaturaError, match=r"points\.zarr: the executor broke down .* goes on from there"):
             swept(store, address, progress=Killer(scheduler.pid))
-        assert [worker.wait(timeout=PATIENCE) for worker in workers] == [0, 0]
+        assert worker.wait(timeout=PATIENCE) == 0
         with pytest.raises(vt.InvalidInput, match="no scheduler of dask answers there"):
             swept(store, address)
     assert capfd.readouterr() == ("", "")
@@ -160,7 +160,7 @@ def test_a_client_that_has_no_scheduler_ends_the_sweep_in_one_line(tmp_path: Pat
     """Expected: before the first point as well."""
     from distributed import Client
 
-    with cluster(tmp_path) as (address, (scheduler, *_)), Client(address, timeout=2) as client:
+    with cluster(tmp_path, 0) as (address, (scheduler,)), Client(address, timeout=2) as client:
         scheduler.kill()
         with pytest.raises(vt.VelaturaError, match=r"points\.zarr: the executor .* before a point was stored"):
             swept(tmp_path / "points.zarr", client)
@@ -208,16 +208,16 @@ def test_a_point_that_ends_its_process_is_recorded(tmp_path: Path) -> None:
     import distributed  # noqa: F401  (has the configuration that is changed)
 
     def deadly(stack: vt.Stack, seed: int) -> dict[str, float]:
-        if stack.flat()["layer0_alpha_u"] in (0.1, 0.3):
+        if stack.flat()["layer0_alpha_u"] == 0.1:
             os.kill(os.getpid(), signal.SIGKILL)
         return {"x": 1.0}
 
-    space = vt.Space(material="bare-gold", vary={"layer0_alpha": {"values": [0.1, 0.2, 0.3, 0.4]}})
+    space = vt.Space(material="bare-gold", vary={"layer0_alpha": {"values": [0.1, 0.2, 0.3]}})
     with dask.config.set({"distributed.scheduler.allowed-failures": 0}):
-        found = vt.sweep(space, deadly, store=tmp_path / "a.zarr", workers=1, chunk=4)
-    assert found.status.values.tolist() == [0, 1, 0, 1]
-    assert set(found.reason.values[::2]) == {"the process that looked at it ended"}
-    assert np.isnan(found.x.values[::2]).all() and np.nansum(found.x.values) == 2
+        found = vt.sweep(space, deadly, store=tmp_path / "a.zarr", workers=1, chunk=3)
+    assert found.status.values.tolist() == [0, 1, 1]
+    assert found.reason.values[0] == "the process that looked at it ended"
+    assert np.isnan(found.x.values[0]) and found.x.values[1:].tolist() == [1, 1]
 
 
 @pytest.fixture
