@@ -1,5 +1,7 @@
 """Uniform materials that are solved once, in NumPy: energies, densities and weights of samples."""
 
+import functools
+
 import numpy as np
 import pytest
 from fuzzing.stacks import random_stack
@@ -25,7 +27,9 @@ HEAVIEST = 3.0  # sample
 POWER = Query(radiance=False)
 
 
+@functools.cache
 def body(stack: MaterialLike) -> tuple[Material, Solved]:
+    """A material and its solution, which several tests ask."""
     material = Material.of(load(stack)).solid()
     return material, solve.solve(material, named("velatura"), variance_kind(material), Context())
 
