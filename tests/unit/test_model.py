@@ -237,7 +237,7 @@ def test_one_channel_of_separate_is_the_grey_stack_of_that_channel() -> None:
         assert np.allclose(found.alpha[1][c], grey.alpha[1], rtol=1e-9)
 
 
-@settings(max_examples=30)
+@settings(max_examples=10)
 @given(
     st.floats(0.01, 0.9), st.floats(0.01, 0.9), st.floats(-180, 180), st.floats(-180, 180), st.floats(0, 6.28),
     st.floats(0.1, 1),
