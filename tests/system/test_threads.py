@@ -17,14 +17,14 @@ import velatura as vt
 from velatura import kernel, scenes
 from velatura.errors import InvalidInput
 
-coat = vt.preset("coated-gold")
+coat, model = vt.preset("coated-gold"), "velatura"
 seen, errors = {}, []
 
 def see(name, value):
     seen.setdefault(name, set()).add(float(np.round(np.mean(value), 4)))
 
 def render():
-    see("render", vt.render(coat, spp=4, size=(24, 24), seed=3))
+    see("render", vt.render(coat, model=model, spp=4, size=(24, 24), seed=3))
 
 def together(*functions):
     def safely(function):
@@ -45,7 +45,7 @@ def together(*functions):
 
 EVERYTHING = """
 def walk():
-    see("walk", vt.reference.statistics(coat, 0.7, paths=20_000, seed=1).energy)
+    see("walk", vt.reference.statistics(coat, 0.7, paths=5_000, seed=1).energy)
 
 def check():
     see("check", vt.check(coat, "belcour2018").passed)
@@ -68,7 +68,8 @@ together(render, walk, check, compare, make, own, render, make)
 """
 
 DROPPED = """
-waiting = [vt.bsdf("bare-gold", "reference") for _ in range(300)]
+model = "belcour2018"  # renders soon
+waiting = [vt.bsdf("bare-gold", "reference") for _ in range(150)]
 
 def drop():
     while waiting:
@@ -80,8 +81,8 @@ def fail():
         raise ZeroDivisionError
 
     for call in (
-        lambda: vt.render(coat, size=(16, 16), spp=2, progress=stop),
-        lambda: vt.render(coat, env="none.exr"),
+        lambda: vt.render(coat, model=model, size=(16, 16), spp=2, progress=stop),
+        lambda: vt.render(coat, model=model, env="none.exr"),
         lambda: vt.bsdf(coat, model="none"),
         lambda: kernel.load_dict({"type": "layered"}),
     ) * 3:
