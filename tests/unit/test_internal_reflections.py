@@ -69,7 +69,7 @@ def test_the_rest_has_the_energy_and_the_share_of_its_densities(stack: vt.Stack)
 def test_scattering_becomes_diffuse_without_a_jump() -> None:
     """By depth, and by direction: the share of diffuse light changes by less than a hundredth where depth and cosine
     change by a thousandth, and has all values."""
-    depths, shares = np.geomspace(0.3, 30, 4600), []
+    depths, shares = np.geomspace(0.9, 6, 1900), []
     for depth in depths:
         shares.append(float(np.mean(internal_reflections.rest(passage_of(milk(0.6, depth)), at(0.7)).diffuse)))
     assert shares[0] == 0 and shares[-1] > 0.999

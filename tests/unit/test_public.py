@@ -44,7 +44,7 @@ ASKED: dict[str, Callable[[Any], Any]] = {
     "shader": lambda m: vt.shader.shader(m).text,
     "bsdf": lambda m: str(vt.bsdf(m)),
     "render": lambda m: np.array(vt.render(m, spp=1, size=(8, 8))),
-    "check": lambda m: [finding.law for finding in vt.check(m).findings],
+    "check": lambda m: [finding.law for finding in vt.check(m, "bati2021").findings],
 }
 
 
