@@ -43,10 +43,10 @@ def random_stack(rng: np.random.Generator, clear: bool = False) -> dict[str, Any
 
 
 @pytest.mark.filterwarnings("ignore::RuntimeWarning")
-def test_ten_thousand_random_stacks_are_those_of_tmm() -> None:
+def test_three_thousand_random_stacks_are_those_of_tmm() -> None:
     rng = np.random.default_rng(0)
     errors = []
-    for _ in range(10_000):
+    for _ in range(3_000):
         stack = random_stack(rng)
         found = films.coherent(**stack)
         index = [stack["eta_1"], *(f.eta + 1j * f.k for f in stack["films"]), stack["eta_2"] + 1j * stack["k_2"]]
@@ -139,9 +139,9 @@ def white(value: float) -> tuple[float, float, float]:
 
 
 def finely(coating: Coating, cosines: np.ndarray) -> np.ndarray:
-    """Its reflectance over wavelengths .02 nm apart, with straight lines between the CIE's values."""
+    """Its reflectance over wavelengths .1 nm apart, with straight lines between the CIE's values."""
     at, weights = srgb_weights()
-    wavelengths_nm = np.arange(360, 830.001, 0.02)
+    wavelengths_nm = np.arange(360, 830.001, 0.1)
     found = []
     for c in range(3):
         stack = [OpticalFilm(film.eta[c], film.k[c], film.thickness_nm) for film in coating.films]
@@ -333,4 +333,4 @@ def test_a_fixed_quadrature_has_the_colours_of_a_fine_one(thickest_nm: float) ->
 def test_interfaces_without_films_have_no_tables(preset: str) -> None:
     """Neither rows of reflectances, nor a texture beside a shader."""
     assert not any(films_of(Material.of(vt.preset(preset))))
-    assert shader(vt.preset(preset)).films is None
+    assert shader(vt.preset(preset), "belcour2018").films is None
