@@ -398,8 +398,9 @@ def test_every_question_has_an_answer(
 ) -> None:
     """Expected: a value with its names; the same as the function of that name gives, where it takes a seed."""
     glass = vt.Stack([vt.Interface(eta=1.5, alpha=0.1)])
+    material = "bare-gold" if what == "check" else glass  # laws take longer of what transmits
     found = swept(
-        {"material": glass, "vary": {"layer0_alpha": {"values": [0.2]}}}, what, tmp_path / "a.zarr", **options
+        {"material": material, "vary": {"layer0_alpha": {"values": [0.2]}}}, what, tmp_path / "a.zarr", **options
     )
     assert found.reason.isnull().all()
     assert found[variable].dims == ("layer0_alpha", *dims) and found[variable].attrs["long_name"]

@@ -369,7 +369,7 @@ def test_report(monkeypatch: pytest.MonkeyPatch) -> None:
         return Built(SHIPPED, {name: 0.5 for name, _ in SHIPPED.items()})
 
     monkeypatch.setattr("velatura.tables.build.report.build", build)
-    monkeypatch.setattr("velatura.tables.build.report.POINTS", 300)
+    monkeypatch.setattr("velatura.tables.build.report.POINTS", 100)
     monkeypatch.setattr("velatura.tables.build.report.WALKED", 10)
     heard: list[float] = []
     rows = {row["table"]: row for row in report(heard.append)}
