@@ -168,8 +168,14 @@ def test_gradients_of_transmission_are_finite_differences(form: str) -> None:
         assert np.isclose(found, slopes[key], rtol=0.03, atol=1e-4), (key, found, slopes[key])
 
 
-@pytest.mark.parametrize("form", ["forward", "symmetric"])
-@pytest.mark.parametrize(("model", "alpha"), [*((model.name, 0.2) for model in vt.MODELS), ("velatura", (0.2, 0.4))])
+@pytest.mark.parametrize(
+    ("model", "alpha", "form"),
+    [
+        *((model.name, 0.2, form) for model in vt.MODELS if model.closed_form for form in ("forward", "symmetric")),
+        ("velatura", 0.2, "forward"),
+        ("velatura", (0.2, 0.4), "symmetric"),
+    ],
+)
 def test_a_clear_medium_above_a_pane_changes_nothing(model: str, alpha: Any, form: str) -> None:
     """Reflected and transmitted shares from both sides."""
     bare = [vt.Interface(eta=1.5, alpha=alpha), vt.Interface(eta=1.0, alpha=0.3)]
