@@ -20,7 +20,7 @@ from velatura.programs.usd import formulas as usd
 from velatura.renderer.low_discrepancy import square
 from velatura.stack import srgb_sensitivity
 
-U1, U2 = square(20_000)
+U1, U2 = square(10_000)
 BLACK, WHITE = (0.0, 0.0, 0.0), (1.0, 1.0, 1.0)
 
 
