@@ -313,8 +313,8 @@ def test_the_coat_of_figure_14() -> None:
 
 BARE = ("anodised-aluminium", "coated-gold", "coloured-absorbing-coat", "turned-brushing", "tinted-plate")
 READERS = (PLAIN, AVERAGED, named("belcour2018"), named("velatura"))
-#: `velatura` gives the last lobe of the plate, in which nothing has a direction, two roughnesses.
-COATED = [(name, model) for name in BARE for model in READERS if (name, model.name) != ("tinted-plate", "velatura")]
+#: `velatura`, which takes longest, reads one stack that is brushed and turned and one that is not.
+COATED = [(name, model) for name in BARE for model in READERS if model.closed_form or name in (BARE[2], BARE[3])]
 
 
 @pytest.mark.parametrize(

@@ -116,11 +116,12 @@ def with_layers(stack: Stack, layers: list[Any]) -> Stack:
 
 @pytest.mark.parametrize("seed", SEEDS)
 def test_turning_all_layers_turns_all_energies(seed: int) -> None:
+    """Facets are met once, or often, in turn."""
     stack = in_range(np.random.default_rng((4, seed)), brushed=True)
     turned = stack.turned(37.0)
     assert turned is not None
-    for often in (False, True):
-        before, after = (
-            solved(Material.of(each), often, AZIMUTH + np.radians(turn)) for each, turn in ((stack, 0), (turned, 37))
-        )
-        alike(before, after, 3e-3)
+    before, after = (
+        solved(Material.of(each), seed % 2 == 1, AZIMUTH + np.radians(turn))
+        for each, turn in ((stack, 0), (turned, 37))
+    )
+    alike(before, after, 3e-3)

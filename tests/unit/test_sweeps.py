@@ -473,7 +473,8 @@ def test_one_thread_renders_and_the_session_keeps_its_own(tmp_path: Path) -> Non
 
     before = dr.thread_count()
     options: dict[str, Any] = {"size": 16, "spp": 4, "model": "belcour2018", "env": "lobby"}  # a file of OpenEXR
-    pictures = [swept(GOLD, "render", tmp_path / f"{n}.zarr", **options).image for n in range(2)]
+    one = {**GOLD, "vary": {"layer0_alpha": {"values": [0.1]}}}
+    pictures = [swept(one, "render", tmp_path / f"{n}.zarr", **options).image for n in range(2)]
     assert pictures[0].dims == ("layer0_alpha", "row", "column", "colour")
     assert dr.thread_count() == before and pictures[0].values.tobytes() == pictures[1].values.tobytes()
 
