@@ -282,13 +282,11 @@ def test_a_furnace_stays_white() -> None:
         assert np.allclose(albedo, 1, atol=0.02)
 
 
-@pytest.mark.parametrize("alphas", ([0.1], [0.05, 0.2]))
-def test_a_furnace_of_rough_interfaces_gains_nothing(alphas: list[float]) -> None:
+def test_a_furnace_of_rough_interfaces_gains_nothing() -> None:
     """The law of energy, which is wrong by chance once in 1000 checks, with an index that depends on wavelength, and a
-    roughness that is a number or a texture."""
+    roughness from a texture."""
     index = {"type": "regular", "wavelength_min": 360, "wavelength_max": 830, "values": "1.35, 1.3"}
-    texels = mi.Bitmap(np.float32(alphas)[None, :, None])
-    alpha = {"type": "bitmap", "bitmap": texels, "raw": True} if len(alphas) > 1 else alphas[0]
+    alpha = {"type": "bitmap", "bitmap": mi.Bitmap(np.float32([[[0.05], [0.2]]])), "raw": True}
     bsdf = kernel.load_dict(
         {"type": "layered", "material": "furnace-rough", "layer0_eta": index, "layer0_alpha": alpha}
     )
