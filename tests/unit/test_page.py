@@ -110,11 +110,11 @@ def test_a_tape_runs_as_numpy_does(k: int) -> None:
     np.testing.assert_allclose(answer["columns"][k], truths[k], rtol=1e-9, atol=1e-12)
 
 
-@pytest.mark.parametrize("number", range(len(presets()) + 1), ids=[*presets(), "pigments"])
-def test_flat_values_are_those_of_the_stack(number: int) -> None:
+@pytest.mark.parametrize(("number", "name"), [*enumerate([*presets(), "pigments"])])
+def test_flat_values_are_those_of_the_stack(number: int, name: str) -> None:
     """Expected: all but those of films, which shaders have as tables."""
     found = answered()[0]["values"][number]
-    stack = [*map(vt.preset, presets()), PAINT][number]
+    stack = PAINT if name == "pigments" else vt.preset(name)
     expected = {at.name: (at, value) for at, value in stack.values() if at.film is None}
     expected = {key: pair for key, pair in expected.items() if not isinstance(pair[1], Varying)}
     assert set(found) == {key for key in expected if not key.endswith("_conductor")}
