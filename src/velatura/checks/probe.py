@@ -116,7 +116,7 @@ class Probe:
         if bad.any():
             which = np.flatnonzero(bad.any(axis=1))
             self.wrong.append(Wrong(function, wi[which], wo[which], rows[which, bad[which].argmax(axis=1)]))
-        return np.nan_to_num(answers, nan=0, posinf=0, neginf=0)
+        return np.where(np.isfinite(answers), answers, 0)
 
     # One batch
 
