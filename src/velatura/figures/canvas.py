@@ -245,14 +245,10 @@ def save(figure: Any, path: str | Path) -> None:
 
 def _sharp(figure: Any) -> float:
     """Dots per inch by which every pixel of the pictures of a figure is drawn; 0 without pictures."""
+    each = [(axes, image) for axes in figure.axes for image in axes.images if image.get_gid() == PICTURE]
+    if not each:
+        return 0.0
     figure.draw_without_rendering()  # which lays it out
+    figure.set_layout_engine("none")  # once, since text is measured for seconds
     inches = figure.dpi_scale_trans.inverted()
-    return max(
-        (
-            image.get_size()[0] / axes.get_window_extent().transformed(inches).height
-            for axes in figure.axes
-            for image in axes.images
-            if image.get_gid() == PICTURE
-        ),
-        default=0.0,
-    )
+    return max(image.get_size()[0] / axes.get_window_extent().transformed(inches).height for axes, image in each)

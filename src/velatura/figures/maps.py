@@ -14,9 +14,10 @@ def scratches(count: int = 160, seed: int = 0) -> Array:
     random, (u, v) = np.random.default_rng(seed), _coordinates()
     found = np.zeros_like(u)
     for x, y, turn, half in zip(*random.random((2, count)), np.pi * random.random(count), random.gamma(2, 0.03, count)):
-        across, along = _turned(_wrapped(u - x), v - y, turn)
+        near = np.abs(v[:, 0] - y) < half + 3 / SIDE  # rows that it crosses
+        across, along = _turned(_wrapped(u[near] - x), v[near] - y, turn)
         beside = np.hypot(across, np.maximum(np.abs(along) - half, 0))
-        found = np.maximum(found, np.clip(1.5 - SIDE * beside / 1.5, 0, 1))
+        found[near] = np.maximum(found[near], np.clip(1.5 - SIDE * beside / 1.5, 0, 1))
     return found
 
 
