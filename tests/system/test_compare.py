@@ -16,10 +16,21 @@ from velatura.comparison import Comparison, Pictures, save_figure
 from velatura.errors import InvalidInput
 from velatura.stack import Diffuse, Interface, Medium, Stack
 
+pytestmark = pytest.mark.usefixtures("one_thread")
+
 Run = Callable[..., tuple[int, str, str]]
 
 PLAIN = {"reflectance": "fresnel", "tir": "off"}
 METAL = Interface(eta=0.2, k=3.9, alpha=0.2)
+
+
+@pytest.fixture
+def few(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Few samples of lobes, and few pixels, of which only the form is looked at."""
+    for name in ("SAMPLES", "LIT_SAMPLES", "BASE_SAMPLES"):
+        monkeypatch.setattr(f"velatura.comparison.evaluated_lobes.{name}", 2**12)
+    monkeypatch.setattr("velatura.comparison.pictures.SIZE", (24, 16))
+    monkeypatch.setattr("velatura.comparison.pictures.SAMPLES", 8)
 
 
 def one_model(found: Comparison) -> str:
@@ -112,7 +123,7 @@ def test_a_plugin_of_the_same_metal_is_the_truth(tmp_path: Path) -> None:
         f'<bsdf version="3.0.0" type="roughconductor"><string name="distribution" value="ggx"/>{values}</bsdf>'
     )
     plain = {"type": "roughconductor", "distribution": "ggx", "eta": 0.2, "k": 3.9, "alpha": 0.2, "id": "as a dict"}
-    found = vt.compare(Stack([METAL]), ["reference", plain, path], [0.8], paths=200_000, microsurface=False)
+    found = vt.compare(Stack([METAL]), ["reference", plain, path], [0.8], paths=100_000, microsurface=False)
     assert list(found.models) == ["reference", "as a dict", "mine"]
     for name, account in found.models.items():
         np.testing.assert_allclose(account.evaluated, found.truth.albedo, atol=5e-3)
@@ -124,7 +135,7 @@ def test_a_plugin_of_the_same_metal_is_the_truth(tmp_path: Path) -> None:
 def test_the_baseline_is_further_from_the_truth_than_the_model(run: Run, tmp_path: Path) -> None:
     """As Belcour 2018 compares them, on frosted metal; what the baseline has no value for is a dash."""
     plot = str(tmp_path / "both.png")
-    arguments = ("compare", "frosted-metal", "--models", "velatura,weidlich_wilkie", "--paths", "100000", "--cos", "1")
+    arguments = ("compare", "frosted-metal", "--models", "velatura,weidlich_wilkie", "--paths", "50000", "--cos", "1")
     status, out, err = run(*arguments, "--plot", plot)
     assert (status, err) == (0, "")
     *_, model, baseline, _ = (line.replace("│", " ").split() for line in out.splitlines())
@@ -180,6 +191,7 @@ def assert_schema(report: dict, names: list[str], directions: int) -> None:
         assert len(model["total_variation"]) == directions and model["roughness_error"] >= 0
 
 
+@pytest.mark.usefixtures("few")
 def test_command_line(run: Run, tmp_path: Path) -> None:
     figure = tmp_path / "figure.png"
     arguments = ["compare", "hazy-metal-sphere", "--paths", "20000", "--models", "belcour2018", "--cos", "1,0.5"]
@@ -190,19 +202,17 @@ def test_command_line(run: Run, tmp_path: Path) -> None:
     assert report["paths"] == 20000 and report["models"]["belcour2018"]["rmse"] is None
     assert figure.read_bytes().startswith(b"\x89PNG") and list(tmp_path.iterdir()) == [figure]
 
-    status, out, err = run("compare", "frosted-glass", "--paths", "20000", "--cos", "0.7", "--polarised")
+    status, out, err = run("compare", "frosted-glass", "--paths", "2000", "--cos", "0.7", "--polarised")
     assert status == 0, err
     assert all(word in out for word in ("truth", "unpolarised", "belcour2018", "R1", "T", "total variation"))
 
 
-def test_pictures_have_an_error_and_a_place_in_the_figure(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("velatura.comparison.pictures.SIZE", (24, 16))
-    monkeypatch.setattr("velatura.comparison.pictures.SAMPLES", 8)
+@pytest.mark.usefixtures("few")
+def test_pictures_have_an_error_and_a_place_in_the_figure(tmp_path: Path) -> None:
     told: list[tuple[int, int]] = []
-    found = vt.compare(
-        Stack([METAL]), None, [1.0, 0.5], 1000, pictures=True, progress=lambda done, total: told.append((done, total))
-    )
-    assert told == [(done, 6 + 2 + len(vt.MODELS)) for done in range(1, told[0][1] + 1)]
+    models = ["velatura", "belcour2018"]
+    found = vt.compare(Stack([METAL]), models, [1.0, 0.5], 1000, pictures=True, progress=lambda *at: told.append(at))
+    assert told == [(done, 6 + 2 + len(models)) for done in range(1, told[0][1] + 1)]
     assert found.pictures and found.pictures.truth.shape == (16, 24, 3)
     assert found.to_dict()["models"]["belcour2018"]["rmse"] == pytest.approx(found.pictures.noise, rel=2)
     save_figure(found, tmp_path / "figure.svg")
@@ -254,6 +264,7 @@ def test_a_texture_has_no_statistics(tmp_path: Path) -> None:
         vt.compare(stack, paths=100)
 
 
+@pytest.mark.usefixtures("few")
 def test_an_interrupted_figure_leaves_nothing(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     from matplotlib.figure import Figure
 

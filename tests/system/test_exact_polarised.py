@@ -24,6 +24,8 @@ from velatura.stack import dumps
 mi = kernel.mitsuba()
 import drjit as dr  # noqa: E402
 
+pytestmark = pytest.mark.usefixtures("one_thread")
+
 GLASS, METAL = {"int_ior": 1.5, "ext_ior": 1.0}, {"eta": 0.2, "k": 3.9}
 GGX = {"distribution": "ggx", "alpha": 0.3}
 CASES = {
@@ -33,14 +35,19 @@ CASES = {
 BOUND = 3.3  # standard errors, which chance exceeds once in a thousand tests
 
 
-@pytest.fixture(autouse=True)
-def polarised() -> Iterator[None]:
-    """A polarised variant, and then the one before."""
+@pytest.fixture(scope="module", autouse=True)
+def variant_kept() -> Iterator[None]:
     before = mi.variant()
-    kernel.mitsuba("llvm_ad_mono_polarized")
-    vt.register()
     yield
     kernel.mitsuba(before)
+
+
+@pytest.fixture(autouse=True)
+def polarised(variant_kept: None) -> None:
+    """A polarised variant, unless the test before has left it."""
+    if mi.variant() != "llvm_ad_mono_polarized":
+        kernel.mitsuba("llvm_ad_mono_polarized")
+        vt.register()
 
 
 def made(*layers: Any, reflectance: str = "fgd") -> Any:
@@ -64,6 +71,7 @@ def smooth(bsdf: Any, cosine: float, mode: Any = mi.TransportMode.Radiance) -> d
         before, after = (mi.Vector3f(*horizontal(tuple(w))) for w in (into, away))
         basis, turned = mi.mueller.stokes_basis, mi.mueller.rotate_mueller_basis
         matrix = turned(weight * bs.pdf, -into, basis(-into), before, away, basis(away), after)
+        dr.eval(matrix, bs.wo)  # in one kernel
         channels = len(mi.UnpolarizedSpectrum())
         each = [[np.broadcast_to(np.array(x), (channels, 2))[:, 0] for x in row] for row in matrix]
         found["reflected" if bs.wo.z[0] * cosine > 0 else "transmitted"] = np.moveaxis(np.array(each), -1, 0)
@@ -95,6 +103,7 @@ def of_samples(bsdf: Any, wi: Any, count: int, side: float = 1.0, delta: bool = 
     rng, context = mi.PCG32(count, 7), mi.BSDFContext(mi.TransportMode.Importance)
     u = [rng.next_float32() for _ in range(3)]
     bs, weight = bsdf.sample(context, points(wi, count), u[0], mi.Point2f(u[1], u[2]))
+    dr.eval(bs, weight)  # once, though it is read thrice
     smooth = np.array(bs.sampled_type & mi.UInt32(+mi.BSDFFlags.Delta)) > 0
     return mean_and_error(weight, wi, bs.wo, (side * np.array(bs.wo.z) > 0) & (delta | ~smooth))
 
@@ -384,7 +393,7 @@ def test_stacks_polarise_as_walks_with_stokes_vectors(reflectance: str) -> None:
     layers = [Interface(eta=2.0, alpha=0.3), Medium(sigma_s=0.2, sigma_a=0.1), Interface(eta=1.0, k=1.0, alpha=0.2)]
     found, error = of_samples(made(*layers, reflectance=reflectance), direction(0.5), 2**17)
     often = reflectance == "fgd-multi"
-    walked = vt.reference.stokes(Stack(layers), 0.5, paths=400_000, microsurface=often)
+    walked = vt.reference.stokes(Stack(layers), 0.5, paths=200_000, microsurface=often)
     assert walked.standard_error
     light = np.sum(walked.reflected, axis=0)[:, 0, 0]
     noise = np.sqrt(np.sum(np.square(walked.standard_error.reflected), axis=0))[:, 0, 0]
