@@ -19,6 +19,8 @@ from velatura.errors import InvalidInput
 mi = kernel.mitsuba("llvm_ad_rgb")
 import drjit as dr  # noqa: E402
 
+pytestmark = pytest.mark.usefixtures("one_thread")
+
 vt.register()
 
 exact = benchmark("exact")

@@ -16,6 +16,8 @@ from velatura.optics.coatings import Coating, ColouredFilm
 from velatura.optics.films import OpticalFilm, coherent
 from velatura.stack import dumps, loads, srgb_sensitivity
 
+pytestmark = pytest.mark.usefixtures("one_thread")
+
 COSINES = [1.0, 0.6, 0.3]
 
 ANODISED = """
