@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import json
 import runpy
 import sys
@@ -17,7 +18,7 @@ from materialx import document, generated
 
 import velatura as vt
 from velatura import kernel
-from velatura.bakes import TARGETS, Bake, bake
+from velatura.bakes import TARGETS, Bake
 from velatura.checks.probe import Probe
 from velatura.model import named
 from velatura.optics.directions import directions
@@ -31,6 +32,7 @@ from velatura.stack import Material
 
 Run = Callable[..., tuple[int, str, str]]
 
+bake = functools.cache(vt.bakes.bake)  # of materials that several tests bake
 
 SHEEN = vt.Stack([vt.Interface(eta=1.6, alpha=0.1), vt.Diffuse(albedo=(0.6, 0.2, 0.1))], name="Paint")
 
@@ -97,7 +99,7 @@ def test_panes_pass_light() -> None:
 
 
 def test_the_same_material_gives_the_same_numbers() -> None:
-    first, second = (bake(SHEEN, "gltf") for _ in range(2))
+    first, second = (vt.bakes.bake(SHEEN, "gltf") for _ in range(2))
     assert first.values == second.values
 
 

@@ -95,6 +95,8 @@ def refracted(
     facet by the cosine to its normal.
     """
     below = 1 - pair.reflected
+    if not below.any():
+        return below
     if abs(eta - 1) < 1e-3:
         return below * microfacets(pair, alpha_u, alpha_v, turn, correlated)
     wi, wo = tuple(pair.wi), tuple(pair.wo)
@@ -107,7 +109,7 @@ def refracted(
 
 def _facets(pair: ViewAndLight, h: Array, alpha_u: Number, alpha_v: Number, turn: float, correlated: bool) -> Array:
     """D G / cos theta_i of the normals h, that are seen from wi and from `straight`."""
-    wi, wo, normal = (ggx.rotate(tuple(w), turn) for w in (pair.wi, pair.straight, h))
+    wi, wo, normal = (ggx.rotate(tuple(w), turn) if turn else tuple(w) for w in (pair.wi, pair.straight, h))
     visible_i, visible_o = ggx.masking(wi, alpha_u, alpha_v), ggx.masking(wo, alpha_u, alpha_v)
     both = visible_i * visible_o
     if correlated:
@@ -232,6 +234,8 @@ def coat(
     pair: ViewAndLight, weight: float, eta: float, alpha_u: float, alpha_v: float, turn: float = 0.0
 ) -> tuple[Array, Array]:
     """Value of the facets of a dielectric coat of some weight, and the share of light that it does not reflect."""
+    if weight == 0:
+        return 0 * pair.cos_i, np.ones_like(pair.cos_i)
     mean = float(np.sqrt(alpha_u * alpha_v))
     f = fresnel.dielectric(pair.cos_d, eta) if eta != 1 else 0 * pair.cos_d
     facets = pair.reflected * f * compensation(pair.cos_i, mean, f) * microfacets(pair, alpha_u, alpha_v, turn)

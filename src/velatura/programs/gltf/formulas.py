@@ -26,33 +26,39 @@ def value(given: Values, pair: ViewAndLight, thin: bool = True) -> Array:
     turn = v["anisotropyRotation"]
     lobe = pair.reflected * closures.microfacets(pair, au, av, turn)
 
-    # Fresnel reflectance of both bases, with the film's
-    f_0 = np.minimum(fresnel.normal_incidence(v["ior"]) * tint, 1.0) * v["specularFactor"]
-    f_dielectric = closures.schlick(pair.cos_d, f_0, v["specularFactor"])
-    f_metal = closures.schlick(pair.cos_d, base)
-    if v["iridescenceFactor"] > 0 and v["iridescenceThicknessMaximum"] > 0:
-        share, n, nm = v["iridescenceFactor"], v["iridescenceIor"], v["iridescenceThicknessMaximum"]
-        f_dielectric = (1 - share) * f_dielectric + share * closures.film_by_schlick(pair.cos_d, n, nm, f_0)
-        f_metal = (1 - share) * f_metal + share * closures.film_by_schlick(pair.cos_d, n, nm, base)
+    def fresnel_of(f_0: Array, f_90: Number = 1.0) -> Array:
+        """Reflectance of facets of a base, with the film's."""
+        f, share = closures.schlick(pair.cos_d, f_0, f_90), v["iridescenceFactor"]
+        if share > 0 and v["iridescenceThicknessMaximum"] > 0:
+            n, nm = v["iridescenceIor"], v["iridescenceThicknessMaximum"]
+            f = (1 - share) * f + share * closures.film_by_schlick(pair.cos_d, n, nm, f_0)
+        return f
 
-    # Diffuse or transmitting base below the dielectric, mixed with metal
-    clear = v["transmissionFactor"]
-    through = base * closures.refracted(pair, 1.0 if thin else v["ior"], au, av, turn)
-    below = (1 - clear) * base * closures.lambert(pair) + clear * through
-    dielectric = f_dielectric * lobe + (1 - np.clip(f_dielectric.max(axis=0), 0, 1)) * below
-    material = (1 - v["metallicFactor"]) * dielectric + v["metallicFactor"] * f_metal * lobe
+    # Diffuse or transmitting base below the dielectric, mixed with metal; what has no share is not worked out
+    metal, material = v["metallicFactor"], np.zeros_like(pair.wi)
+    if metal < 1:
+        f_0 = np.minimum(fresnel.normal_incidence(v["ior"]) * tint, 1.0) * v["specularFactor"]
+        f, clear = fresnel_of(f_0, v["specularFactor"]), v["transmissionFactor"]
+        through = base * closures.refracted(pair, 1.0 if thin else v["ior"], au, av, turn)
+        below = (1 - clear) * base * closures.lambert(pair) + clear * through
+        material += (1 - metal) * (f * lobe + (1 - np.clip(f.max(axis=0), 0, 1)) * below)
+    if metal > 0:
+        material += metal * fresnel_of(base) * lobe
 
     # Clearcoat, by the Fresnel reflectance of the normal
-    share = v["clearcoatFactor"] * closures.schlick(pair.cos_i, COAT_F_0)
-    alpha = max(v["clearcoatRoughnessFactor"] ** 2, closures.ALPHA_MIN)
-    coated = (1 - share) * material + share * pair.reflected * closures.microfacets(pair, alpha, alpha)
+    if v["clearcoatFactor"] > 0:
+        share = v["clearcoatFactor"] * closures.schlick(pair.cos_i, COAT_F_0)
+        alpha = max(v["clearcoatRoughnessFactor"] ** 2, closures.ALPHA_MIN)
+        material = (1 - share) * material + share * pair.reflected * closures.microfacets(pair, alpha, alpha)
 
     # Coat, likewise, which tints and darkens by its weight (KHR_materials_coat; darkening of OpenPBR 1.1)
     weight, eta, tint = v["coatFactor"], v["coatIor"], np.reshape(v["coatColorFactor"], (3, 1))
-    f_0 = fresnel.normal_incidence(eta)
-    inside = 1 - (1 - f_0) / eta**2
-    darkening = 1 + v["coatDarkeningFactor"] * ((1 - inside) / (1 - base * inside) - 1)
-    share = weight * closures.schlick(pair.cos_i, f_0)
-    au, av = closures.anisotropic(*alphas(v["coatRoughnessFactor"], v["coatAnisotropyStrength"]))
-    facets = pair.reflected * closures.microfacets(pair, au, av, v["coatAnisotropyRotation"])
-    return np.asarray((1 - share) * (1 - weight + weight * tint * darkening) * coated + share * facets)
+    if weight > 0:
+        f_0 = fresnel.normal_incidence(eta)
+        inside = 1 - (1 - f_0) / eta**2
+        darkening = 1 + v["coatDarkeningFactor"] * ((1 - inside) / (1 - base * inside) - 1)
+        share = weight * closures.schlick(pair.cos_i, f_0)
+        au, av = closures.anisotropic(*alphas(v["coatRoughnessFactor"], v["coatAnisotropyStrength"]))
+        facets = pair.reflected * closures.microfacets(pair, au, av, v["coatAnisotropyRotation"])
+        material = (1 - share) * (1 - weight + weight * tint * darkening) * material + share * facets
+    return np.asarray(material)

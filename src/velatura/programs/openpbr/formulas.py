@@ -39,19 +39,20 @@ def value(given: Values, pair: ViewAndLight, thin: bool = True) -> Array:
     mean = float(np.sqrt(au * av))
     lobe = pair.reflected * closures.microfacets(pair, au, av, turn)
 
-    # Metal, and dielectric over a diffuse or transparent base
-    eta = base_index(v)
+    # Metal, and dielectric over a diffuse or transparent base; what has no share is not worked out
+    eta, metal = base_index(v), v["base_metalness"]
     f_metal, f_dielectric = reflectances(v, pair.cos_d, eta)
-    metal_part = v["specular_weight"] * f_metal * closures.compensation(cos_i, mean, f_metal) * lobe
-    shown = closures.compensation(cos_i, mean, f_dielectric)
-    over = specular * f_dielectric * shown * lobe
-    f_0 = fresnel.normal_incidence(eta)
-    kept = 1 - closures.dielectric_albedo(cos_i, mean, eta) * closures.compensation(cos_i, mean, f_0)
-    diffuse = v["base_weight"] * closures.oren_nayar(pair, base, v["base_diffuse_roughness"])
-    through = transmitted * closures.refracted(pair, 1.0 if thin else eta, au, av, turn)
-    clear = v["transmission_weight"]
-    dielectric = over + kept * ((1 - clear) * diffuse + clear * through)
-    substrate = (1 - v["base_metalness"]) * dielectric + v["base_metalness"] * metal_part
+    substrate = np.zeros_like(pair.wi)
+    if metal < 1:
+        over = specular * f_dielectric * closures.compensation(cos_i, mean, f_dielectric) * lobe
+        f_0 = fresnel.normal_incidence(eta)
+        kept = 1 - closures.dielectric_albedo(cos_i, mean, eta) * closures.compensation(cos_i, mean, f_0)
+        diffuse = v["base_weight"] * closures.oren_nayar(pair, base, v["base_diffuse_roughness"])
+        through = transmitted * closures.refracted(pair, 1.0 if thin else eta, au, av, turn)
+        clear = v["transmission_weight"]
+        substrate += (1 - metal) * (over + kept * ((1 - clear) * diffuse + clear * through))
+    if metal > 0:
+        substrate += metal * v["specular_weight"] * f_metal * closures.compensation(cos_i, mean, f_metal) * lobe
 
     # Coat: darkening, absorption, and its own reflection on top
     eta_c = v["coat_ior"]
