@@ -26,6 +26,7 @@ import velatura as vt
 from velatura.exports import FORMATS, baked, klems, real_time
 from velatura.exports.request import Request
 from velatura.model import named
+from velatura.shader import closures
 from velatura.stack import Texture
 
 HARMLESS = "Plain paint"
@@ -128,23 +129,30 @@ def beside(made: vt.exports.Export) -> dict[str, str]:
     return {end: of_code(data.decode()) for end, data in made.beside.items() if end in (".cs", ".ush")}
 
 
+FIT, ENVIRONMENT, FITTED = baked.bake, real_time.environment, dict[Any, Any]()
+
+
 @pytest.fixture(autouse=True)
 def fitted_once(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Parameters and matrices do not depend on names; they are fitted once for a target, or are 0."""
-    fit, found = baked.bake, dict[str, Any]()
+    """Numbers do not depend on names: they are fitted once for all tests, or are few, or are 0."""
 
     def of_any_name(stack: vt.Stack | vt.Mix, target: str, *rest: Any, **options: Any) -> Any:
-        made = found[target] = found.get(target) or fit(stack, target, *rest, **options)
+        key = target, *((name, type(value)) for name, value in stack.flat().items())
+        made = FITTED[key] = FITTED.get(key) or FIT(stack, target, *rest, **options)
         texture: Any = next((x for x in stack.flat().values() if isinstance(x, Texture)), None)
         images = {name: replace(image, texture=texture) for name, image in made.images.items()}
         return replace(made, name=stack.name, images=images)
 
     monkeypatch.setattr(baked, "bake", of_any_name)
-    of_parts, harmless = real_time.environment, Request("three", painted(), named(MODEL), {}, None, {})
-    parts = functools.cache(lambda: of_parts(harmless))
     monkeypatch.setattr(real_time, "environment", lambda request: parts())
-    nothing = np.zeros((klems.PATCHES, klems.PATCHES))
-    monkeypatch.setattr(klems, "sides", lambda bsdf, side: (nothing, nothing))
+    monkeypatch.setattr(closures, "PAIRS", 16)
+    monkeypatch.setattr(klems, "PATCHES", 2)
+    monkeypatch.setattr(klems, "sides", lambda bsdf, side: np.zeros((2, 2, 2)))
+
+
+@functools.cache
+def parts() -> Any:
+    return ENVIRONMENT(Request("three", painted(), named(MODEL), {}, None, {}))
 
 
 def painted(name: str = HARMLESS, albedo: Any = 0.4) -> vt.Stack:
