@@ -17,7 +17,7 @@ import pytest
 
 import velatura as vt
 from velatura import checks, kernel
-from velatura.checks import LAWS, Finding, Report, check, evidence, grid, laws, probe
+from velatura.checks import LAWS, Finding, Report, check
 from velatura.errors import InvalidInput
 from velatura.model import SWITCHES
 from velatura.plugins import exact, weidlich_wilkie
@@ -30,19 +30,6 @@ import drjit as dr  # noqa: E402
 pytestmark = pytest.mark.usefixtures("one_thread")
 
 Run = Callable[..., tuple[int, str, str]]
-
-
-@pytest.fixture
-def few(monkeypatch: pytest.MonkeyPatch) -> None:
-    """A quarter of the samples in a quarter of the cells, in a third of the time: errors of some percent still show,
-    and the rate of false alarms is the same."""
-    for module in (evidence, laws):
-        monkeypatch.setattr(module, "SAMPLES", 2**14)
-        monkeypatch.setattr(module, "PILOT", 2**12)
-    monkeypatch.setattr(grid, "CELLS", 16)
-    monkeypatch.setattr(probe, "_BATCH", 2**14)
-
-
 DOCS = Path(__file__).parents[2] / "docs" / "explanation" / "laws.md"
 
 
@@ -151,7 +138,7 @@ class Turned(Through):
 # BSDFs that keep the laws
 
 
-@pytest.mark.usefixtures("few")
+@pytest.mark.usefixtures("few_samples")
 @pytest.mark.parametrize(
     "described",
     [
@@ -194,7 +181,7 @@ def test_a_white_surface_of_our_own_keeps_every_law() -> None:
     assert report["limit"].value < 1e-5
 
 
-@pytest.mark.usefixtures("few")
+@pytest.mark.usefixtures("few_samples")
 @pytest.mark.parametrize("rho", [0.0, 0.3, 0.9])
 def test_the_furnace_is_a_number(rho: float) -> None:
     """Expected: the albedo of a Lambertian surface is its reflectance."""
@@ -360,7 +347,7 @@ SLIGHTLY = {"a rough metal, a little off", "a narrow lobe, a little off"}  # whi
 def test_what_is_broken_is_found(request: pytest.FixtureRequest, name: str) -> None:
     """Expected: the law that is broken is named."""
     if name not in SLIGHTLY:
-        request.getfixturevalue("few")
+        request.getfixturevalue("few_samples")
     law, make = BROKEN[name]
     report = check(make())
     assert law in report.broken
@@ -372,7 +359,7 @@ def test_every_law_is_broken_by_something() -> None:
     assert {law for law, _ in BROKEN.values()} | {"lossless", "limit"} == {law.name for law in LAWS}
 
 
-@pytest.mark.usefixtures("few")
+@pytest.mark.usefixtures("few_samples")
 def test_layers_that_do_not_turn_as_they_should_are_found() -> None:
     """Expected: a brushed metal that was turned by 30 degrees is that one, and none that was not turned."""
     brushed = metal((0.1, 0.3))
@@ -381,7 +368,7 @@ def test_layers_that_do_not_turn_as_they_should_are_found() -> None:
     assert check(brushed, turned=(Turned(brushed, 25), 30)).broken == ("turning",)
 
 
-@pytest.mark.usefixtures("few")
+@pytest.mark.usefixtures("few_samples")
 def test_loss_is_found_where_nothing_absorbs() -> None:
     """Expected: a grey surface is broken only if it is said to be lossless."""
     grey = Made(f=lambda wi, wo: 0.98 * dr.inv_pi)
@@ -389,7 +376,7 @@ def test_loss_is_found_where_nothing_absorbs() -> None:
     assert check(grey, lossless=True).broken == ("lossless",)
 
 
-@pytest.mark.usefixtures("few")
+@pytest.mark.usefixtures("few_samples")
 @pytest.mark.parametrize(
     ("found", "expected"),
     [
@@ -404,7 +391,7 @@ def test_a_limit_that_is_not_reached_is_found(found: dict[str, Any], expected: d
     assert check(mi.load_dict(found), expected=mi.load_dict(expected)).broken == ("limit",)
 
 
-@pytest.mark.usefixtures("few")
+@pytest.mark.usefixtures("few_samples")
 def test_radiance_is_scaled_by_the_squared_index() -> None:
     """Expected: a dielectric that forgets it gains energy from one side, and is not reciprocal."""
     forgetful = Through(mi.load_dict({"type": "roughdielectric", "alpha": 0.3}), importance=True)
@@ -493,7 +480,7 @@ def test_chi_square_decides_as_mitsubas_own(drawn: float, passes: bool) -> None:
 # What is reported
 
 
-@pytest.mark.usefixtures("few")
+@pytest.mark.usefixtures("few_samples")
 def test_exceptions_are_numbers_and_no_failures() -> None:
     one_way = Made(f=lambda wi, wo: (1 - 0.1 * wi.z) * dr.inv_pi)
     report = check(one_way, exceptions={"reciprocity"})
@@ -504,7 +491,7 @@ def test_exceptions_are_numbers_and_no_failures() -> None:
     assert rows["reciprocity"]["status"] == "declared"
 
 
-@pytest.mark.usefixtures("few")
+@pytest.mark.usefixtures("few_samples")
 def test_what_is_broken_leaves_a_plot(tmp_path: Path) -> None:
     """Expected: one picture for each law that is broken, and none for those that are declared."""
     wrong = Made(density=lambda wi, wo: dr.inv_two_pi, f=lambda wi, wo: (1.1 - 0.1 * wi.z) * dr.inv_pi)
@@ -531,7 +518,7 @@ def test_what_cannot_be_checked_is_refused(tmp_path: Path) -> None:
 # Materials
 
 
-@pytest.mark.usefixtures("few")
+@pytest.mark.usefixtures("few_samples")
 def test_a_material_is_checked_with_what_its_model_declares() -> None:
     """Expected: of a forward model that one-way street is known; a wrong limit and a law of one's own are not."""
     bare = vt.Stack([vt.Interface(eta=0.2, k=3.9, alpha=0.2)])
@@ -561,7 +548,7 @@ def test_models_keep_what_they_do_not_declare(model: str, form: str, name: str) 
     assert report.passed, {law: report[law] for law in report.broken}
 
 
-@pytest.mark.usefixtures("few")
+@pytest.mark.usefixtures("few_samples")
 @pytest.mark.parametrize("name", ["crossed-brushing", "furnace-rough", "wet-copper"])
 def test_where_energy_is_balanced_nothing_gains(name: str) -> None:
     """Expected: of the symmetric form of `velatura`, over opaque presets on which published models gain. Anisotropic
@@ -577,7 +564,7 @@ def test_panes_declare_gain() -> None:
     assert "energy" in vt.bsdf("frosted-glass", model="velatura", form="symmetric").exceptions
 
 
-@pytest.mark.usefixtures("few")
+@pytest.mark.usefixtures("few_samples")
 @pytest.mark.parametrize(
     ("layers", "exterior", "form", "declared"),
     [
@@ -599,7 +586,7 @@ def test_what_gains_declares_it(layers: list, exterior: float, form: str, declar
     assert vt.check(stack, form=form).passed
 
 
-@pytest.mark.usefixtures("few")
+@pytest.mark.usefixtures("few_samples")
 def test_what_gains_nothing_declares_none() -> None:
     """Expected: a white base below two interfaces keeps energy with `velatura`, whose light is followed between all of
     them; so do smooth stacks, which keep every law."""
@@ -611,7 +598,7 @@ def test_what_gains_nothing_declares_none() -> None:
         assert all(finding.status == "kept" for finding in report.findings)
 
 
-@pytest.mark.usefixtures("few")
+@pytest.mark.usefixtures("few_samples")
 def test_sharply_brushed_metal_below_coats_keeps_the_furnace() -> None:
     """Weights of its lobe bend between few cosines; it gained .0037 of the light between 20."""
     coats = [vt.Interface(eta=eta, alpha=alpha) for eta, alpha in ((1.53, 1.0), (1.0, 0.22), (1.0, 0.033))]
@@ -619,14 +606,14 @@ def test_sharply_brushed_metal_below_coats_keeps_the_furnace() -> None:
     assert vt.check(stack)["white furnace"].passed
 
 
-@pytest.mark.usefixtures("few")
+@pytest.mark.usefixtures("few_samples")
 def test_a_black_material_breaks_no_law() -> None:
     """Rationale: what rounding leaves of no light at all is not reciprocal, and none of it matters."""
     stack = vt.Stack([vt.Interface(eta=1.0, alpha=0.5), vt.Diffuse(albedo=0.0)])
     assert vt.check(stack, form="symmetric").passed
 
 
-@pytest.mark.usefixtures("few")
+@pytest.mark.usefixtures("few_samples")
 def test_samples_of_the_symmetric_form_reach_all_that_passes_a_pane() -> None:
     """Rationale: from inside, beyond the critical angle of the forward form, samples that go by its lobes miss what
     the symmetric form transmits (a fifth of it here). Expected: no law is broken; false alarms 1 in 1000."""
@@ -638,7 +625,7 @@ def test_samples_of_the_symmetric_form_reach_all_that_passes_a_pane() -> None:
 NOT_ITS_DENSITY = {"normalisation", "chi-square", "weights"}
 
 
-@pytest.mark.usefixtures("few")
+@pytest.mark.usefixtures("few_samples")
 @pytest.mark.parametrize(
     ("model", "material", "declared"),
     [
@@ -657,7 +644,7 @@ def test_a_plugin_is_checked_with_what_it_declares(run: Run, model: str, materia
     assert all(law["value"] > law["bound"] for law in laws if law["status"] == "declared")
 
 
-@pytest.mark.usefixtures("few")
+@pytest.mark.usefixtures("few_samples")
 def test_the_reference_loses_nothing_with_the_microsurface_walk() -> None:
     """Expected: what is drawn keeps all energy, and loss would break a law."""
     report = check(vt.bsdf("frosted-glass", "reference", microsurface=True), lossless=True)
@@ -665,7 +652,7 @@ def test_the_reference_loses_nothing_with_the_microsurface_walk() -> None:
     assert report["energy"].value == pytest.approx(1, abs=1e-3)
 
 
-@pytest.mark.usefixtures("few")
+@pytest.mark.usefixtures("few_samples")
 def test_what_the_reference_declares_hides_no_error() -> None:
     """Expected: an `eval` that is 5 % too bright for its samples breaks a law."""
     bsdf = vt.bsdf("coated-gold", "reference")

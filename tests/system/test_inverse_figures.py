@@ -29,6 +29,8 @@ from velatura.figures import (
     looks,
 )
 
+pytestmark = pytest.mark.usefixtures("one_thread")
+
 ROWS = bati2021.FIGURES
 
 
@@ -66,7 +68,7 @@ def test_classes_of_smooth_pairs(tmp_path: Path) -> None:
 
 def test_the_order_of_lobes_shows_at_the_edge(tmp_path: Path) -> None:
     """Figure 17. Expected: the same energies head-on; at grazing angles a tint that depends on the order."""
-    found = bati2021_17.compute(size=16, spp=2)
+    found = bati2021_17.compute(size=16, spp=2, members=9)
     blue, red = (found[order] for order in bati2021_17.ORDERS)
     assert np.allclose(blue["energy"][0], red["energy"][0], atol=1e-6)
     assert np.allclose(blue["energy"][0], np.add([0.025, 0.045, 0.05], [0.052, 0.025, 0.025]), atol=1e-6)

@@ -309,6 +309,7 @@ def test_walks_through_a_mixture_agree_with_its_lobes_and_with_the_plugin() -> N
     assert np.allclose(np.array(weight).mean(axis=1), found.truth.albedo[:, 0], atol=0.006)
 
 
+@pytest.mark.usefixtures("few_samples")
 @pytest.mark.parametrize("mix", [WORN, NESTED], ids=["worn", "nested"])
 def test_mixtures_keep_the_laws(mix: vt.Mix) -> None:
     """One report in 1000 is a false alarm, and seeds are fixed."""
