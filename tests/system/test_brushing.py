@@ -15,6 +15,8 @@ from velatura.stack import Brushing, Interface, Stack
 mi: Any = kernel.mitsuba("llvm_ad_rgb")
 import drjit as dr  # noqa: E402
 
+pytestmark = pytest.mark.usefixtures("one_thread")
+
 
 def brushed(rotation: Any) -> Any:
     return vt.bsdf(Stack([Interface(conductor="Al", alpha=(0.05, 0.4), rotation=rotation)]), "yamaguchi2019")

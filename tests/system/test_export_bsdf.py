@@ -12,6 +12,8 @@ import velatura as vt
 from velatura import kernel
 from velatura.inverse import load_table, table_of
 
+pytestmark = pytest.mark.usefixtures("one_thread")
+
 Run = Callable[..., tuple[int, str, str]]
 
 SAMPLES = 200_000  # directions; their weights have a mean whose error is below .001

@@ -16,6 +16,8 @@ from velatura.exports import klems
 from velatura.exports.klems import COUNTS, EDGES, FIRST, RINGS, SOLID_ANGLES, sides
 from velatura.stack.spectra import LUMINANCE
 
+pytestmark = pytest.mark.usefixtures("one_thread")
+
 Run = Callable[..., tuple[int, str, str]]
 
 PANE = vt.Stack(

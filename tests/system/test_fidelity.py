@@ -15,6 +15,8 @@ import pytest
 import velatura as vt
 from velatura import kernel
 
+pytestmark = pytest.mark.usefixtures("one_thread")
+
 BENCHMARKS = str(Path(__file__).parents[2] / "benchmarks")
 PATHS = 200_000
 

@@ -17,6 +17,8 @@ from velatura.renderer.packets import aligned
 mi = kernel.mitsuba("llvm_ad_rgb")
 import drjit as dr  # noqa: E402
 
+pytestmark = pytest.mark.usefixtures("one_thread")
+
 COSINES = np.array([1.0, 0.6, 0.2])
 BOUND = 0.005  # of the incident light
 PATHS = 300_000

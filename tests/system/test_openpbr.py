@@ -13,6 +13,8 @@ from velatura import kernel
 from velatura.errors import Incomplete
 from velatura.stack import dumps
 
+pytestmark = pytest.mark.usefixtures("one_thread")
+
 mi: Any = kernel.mitsuba("scalar_rgb")
 vt.register()
 

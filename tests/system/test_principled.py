@@ -9,6 +9,8 @@ from velatura import kernel
 from velatura.programs.closures import ViewAndLight
 from velatura.programs.principled import formulas as principled
 
+pytestmark = pytest.mark.usefixtures("one_thread")
+
 
 @pytest.mark.parametrize("seed", range(4))
 def test_the_formulas_are_those_of_the_plugin(seed) -> None:
