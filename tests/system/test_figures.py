@@ -31,6 +31,7 @@ from velatura.figures import (
     canvas,
     evaluation,
     figure,
+    films_under_coats,
     linear_space,
     maps,
     store,
@@ -596,8 +597,9 @@ def test_every_pixel_of_a_picture_is_drawn(ending: str, tmp_path: Path) -> None:
 # The verb
 
 
-def test_films_keep_their_colours_under_coats(made: Made) -> None:
+def test_films_keep_their_colours_under_coats(made: Made, monkeypatch: pytest.MonkeyPatch) -> None:
     """Expected: ours are those of the truth within noise; who forgets the coat above the film has other ones."""
+    monkeypatch.setattr(films_under_coats, "THICKNESSES_NM", range(0, 5001, 250))
     found = made("films-under-coats")
     assert found["integration"]["ours"]["most"] < 0.003 < found["integration"]["Gaussians"]["mean"]
     for cell in found["cells"]:
