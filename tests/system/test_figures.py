@@ -49,7 +49,9 @@ pytestmark = pytest.mark.usefixtures("one_thread")
 
 @pytest.fixture(autouse=True)
 def coarse(monkeypatch: pytest.MonkeyPatch) -> None:
-    """A model's lobes as evaluated, by an eighth of the samples, which lie on a lattice."""
+    """A model's lobes as evaluated, by an eighth of the samples, which lie on a lattice; and a sphere for the urn, that
+    is rendered in `test_scenes.py`: its mesh takes most of the time of small pictures."""
+    monkeypatch.setitem(objects.OBJECTS, "urn", objects.OBJECTS["sphere"])
     monkeypatch.setattr(evaluated_lobes, "SAMPLES", 2**16)
     monkeypatch.setattr(evaluated_lobes, "LIT_SAMPLES", 2**14)
 
@@ -471,12 +473,8 @@ def test_scattering_over_gold_blurs_and_does_not_darken(made: Made) -> None:
 
 @pytest.mark.parametrize("name", ["belcour2018-01", "belcour2018-18", "weier2020-12"])
 def test_textured_urns(made: Made, name: str, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Belcour 2018, figures 1 and 18; Weier & Belcour 2020, figure 12. Expected: about as bright as the truth.
-
-    Smaller textures lie on a sphere here, which is loaded sooner; an urn is rendered for figure 14.
-    """
+    """Belcour 2018, figures 1 and 18; Weier & Belcour 2020, figure 12. Expected: about as bright as the truth."""
     monkeypatch.setattr(maps, "SIDE", 128)
-    monkeypatch.setitem(objects.OBJECTS, "urn", objects.OBJECTS["sphere"])
     (cell,) = made(name)["cells"]
     truth = cell["mean"].pop("reference")
     assert all(mean == pytest.approx(truth, rel=0.12) for mean in cell["mean"].values())

@@ -116,8 +116,13 @@ def _coated(coat: ClearCoat | None, alpha: float, base: Array, darkening: Array 
     if coat is None:
         return [GgxLobe(alpha, base, plain)]
     above = np.repeat(np.asarray(fresnel.dielectric(_COSINES, coat.eta))[:, None], 3, axis=1)
-    left = (1 - coat.albedo(_COSINES))[:, None]
-    return [GgxLobe(coat.alpha, above, plain), GgxLobe(alpha, base, darkening * left * plain)]
+    return [GgxLobe(coat.alpha, above, plain), GgxLobe(alpha, base, darkening * _left(coat) * plain)]
+
+
+@functools.cache
+def _left(coat: ClearCoat) -> Array:
+    """The share (NODES, 1) of light that a coat does not reflect, which every neighbour asks for."""
+    return 1 - coat.albedo(_COSINES)[:, None]
 
 
 # The film
