@@ -98,6 +98,18 @@ def test_a_closed_form_gives_one_answer_under_the_hand_and_at_rest() -> None:
     assert not rest.met and hand.exact and hand.part == rest.part
 
 
+def test_rounding_of_the_present_stack_does_not_change_an_answer() -> None:
+    """Expected: of coordinates that differ by 1e-14, the same stack to the last digit, far from the present one."""
+    coated = Stack([vt.Interface(eta=1.4, alpha=0.1), vt.Medium(sigma_a=0.1), vt.Interface(eta=0.5, k=3, alpha=0.2)])
+    model = named("velatura")
+    now = seen(coated, Target([{"energy": 0.1}, {"energy": 0.1, "base": "conductor"}]), model)
+    wish = now.with_energy(0, (0.6, 0.6, 0.6))
+    present = DraggedStack.of(coated, wish, model)
+    assert present is not None
+    first, other = (nearest(present.at(x), wish, quick=True) for x in present.point.x * [[1], [1 + 1e-14]])
+    assert first.stack.stack == other.stack.stack and first.part > 0.5
+
+
 def test_a_refusal_of_a_wish_from_a_material_offers_the_nearest_answer_first() -> None:
     """A way out without the material reads the same, "lobe 1 energy 0.36", and comes after one of another form."""
     glass = Stack([vt.Interface(eta=1.5)])

@@ -29,6 +29,7 @@ UNLIKE = 1e-3  # energy or variance by which a stack differs from the nearest th
 HALVINGS = 6  # of the way that is left, where other searches are looked at
 DIMMED = 0.7  # share of the energy of a lobe that it has in any case if it is blurred more
 LEAST = 1e-3  # part of the way that is no change
+DIGITS = 9  # of coordinates that a search begins from
 BEYOND = 0.05  # parts of the way by which models differ
 ROUNDED = 1e-3  # share of an energy by which a wish may be off, that is not worth a word
 
@@ -71,6 +72,8 @@ def nearest(present: DraggedStack, wish: Target, now: Target | None = None, quic
     quick: as exact as is needed under the hand; readings of a slow model that follow make the answer exact.
     """
     quick = quick and present.space.slow
+    if present.space.slow:
+        present = present.at(_short(present.point.x))
     possible = present.achromatic(wish)
     grey = _colour_lost(present, wish, possible)
     if present.missed(possible, present.space.counted) < EXACT:
@@ -93,6 +96,12 @@ def nearest(present: DraggedStack, wish: Target, now: Target | None = None, quic
     if bound is not None:
         return dataclasses.replace(answer, lobe=bound.lobe, reason=_named(bound, wish))
     return _told(answer, grey or _colour_lost(present, wish, found.now(wish) if present.coloured else possible))
+
+
+def _short(x: np.ndarray) -> np.ndarray:
+    """Coordinates of `DIGITS` digits. A search of many steps may end elsewhere from a stack that differs by rounding, as
+    one does that was written to a file and read."""
+    return np.array([float(f"{each:.{DIGITS}g}") for each in x])
 
 
 def _told(answer: Nearest, grey: str | None) -> Nearest:
