@@ -99,8 +99,8 @@ def nearest(present: DraggedStack, wish: Target, now: Target | None = None, quic
 
 
 def _short(x: np.ndarray) -> np.ndarray:
-    """Coordinates of `DIGITS` digits. A search of many steps may end elsewhere from a stack that differs by rounding, as
-    one does that was written to a file and read."""
+    """Coordinates of `DIGITS` digits. A search of many steps may end elsewhere from a stack that differs by rounding,
+    as one does that was written to a file and read."""
     return np.array([float(f"{each:.{DIGITS}g}") for each in x])
 
 
