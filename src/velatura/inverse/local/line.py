@@ -33,7 +33,7 @@ FOLLOWED, ASTRAY = 0.05, 0.5  # misses that are small, and first ones that lead 
 SLOWLY, NEAR = 0.7, 0.015  # the share of the last miss that is no progress, and misses from which the way goes on
 SEEN, BACK = 0.03, 0.7  # of the way that is gone astray: the least that counts, and the share to go
 FURTHER_ON, ONWARDS, SHORT = 2.0, 0.02, 5e-3  # steps along the line: by an easy last one, anew, and the least
-LANDING, LOWER = 4, 0.01  # readings that lead back to the line, and by how much less is aimed at if they do not
+LANDING, LOWER = 4, 0.01  # readings that lead back to the line, and by how much less is aimed at first if they do not
 FOLDED = 1 - 1e-3  # the largest variance, folded, that a correction leads to
 BENT, ROUNDED = 0.5, 1e-9  # by how much corrections are off their slopes: share of the square of a distance, and least
 BESIDE = 10.0  # part of the way that it is worth to be as much nearer to the line
@@ -352,14 +352,16 @@ class _Search:
     aims at a part of the way: by how far it got, then on from there, in steps like the last ones. In the end it leads
     back to the line. All of this is the same for all answers; for an exact one, the search goes on from there.
 
-    read: all points so far. base, best: the last point near the line, and the best one. aim: part of the way. step: the
-    length of steps. last: what was missed before, infinite of a new aim. landing, stuck: whether it leads back to the
-    line, and whether it has begun anew from where it stood still.
+    read: the points that corrections follow from. seen: all points so far, and where they are. base, best: the last
+    point near the line, and the best one. aim: part of the way. step: the length of steps. last: what was missed
+    before, infinite of a new aim. landing, stuck: whether it leads back to the line, and whether it has begun anew from
+    where it stood still. lower: by how much less is aimed at next where it does not get nearer to the line.
     """
 
     line: Line
     whole: bool
     read: list[_Read]
+    seen: list[tuple[Reached, _Read]]
     base: tuple[Reached, _Read]
     best: tuple[Reached, _Read]
     correction: _Correction
@@ -369,6 +371,7 @@ class _Search:
     settled: bool = False
     landing: bool = False
     stuck: bool = False
+    lower: float = LOWER
 
     @classmethod
     def of(cls, line: Line, whole: bool) -> _Search:
@@ -377,7 +380,7 @@ class _Search:
         first = _Read(x, value, space.quickly.read(x[:, None])[:, 0])
         line = dataclasses.replace(line, enough=max(line.enough, QUICK))
         begun = line._reached(x, value), first
-        return cls(line, whole, [first], begun, begun, _Correction.fitted(space, [first], first))
+        return cls(line, whole, [first], [begun], begun, begun, _Correction.fitted(space, [first], first))
 
     def go(self, readings: int) -> None:
         """Read at most so many points, from the best one so far."""
@@ -395,8 +398,9 @@ class _Search:
         """Read at most so many points more, until they miss no more than the line allows."""
         self.line = line
         if not self.settled:
-            self.base, self.landing = self.best, True
+            self.base, self.landing, self.lower = self.best, True, LOWER
             self._aimed(self.base[1], self.base[0].part, self.base[0].off)
+        self.best = max(self.seen, key=lambda each: line._worth(each[0]))
         for _ in range(readings):
             if self._ends():
                 return
@@ -415,6 +419,7 @@ class _Search:
         now, missed, hoped = _Read(x, value, near), line._apart(value, expected), line.placed(expected)[0]
         there = line._reached(x, value)
         self.read.append(now)
+        self.seen.append((there, now))
         self.best = max(self.best, (there, now), key=lambda each: line._worth(each[0]))
         astray = missed > (ASTRAY if self.last == np.inf else max(FOLLOWED, SLOWLY * self.last))
         self.settled = max(missed, nearly) < enough and (self.aim == 1 or abs(hoped - self.aim) > enough)
@@ -435,7 +440,8 @@ class _Search:
         gone, far = there.part - base.part, self.aim - base.part
         if self.landing:
             nearer = there.off < max(self.line.allowed, self.last)
-            self._aimed(now, self.aim if nearer else self.aim - LOWER, there.off if nearer else np.inf)
+            self._aimed(now, self.aim if nearer else self.aim - self.lower, there.off if nearer else np.inf)
+            self.lower *= 1 if nearer else 2
         elif astray:
             self.step = BACK * gone if SEEN < gone < far else far / 4
             self._stepped()
