@@ -194,7 +194,8 @@ def _by_closed_form(
     leads further than a part of the way. Where that is a way, the answer must lie well beyond it: by an index on the
     other side of that above, which no line leads to."""
     near = nearest(present.quickly, wish)
-    further = near.part >= max(LEAST, least + (0 if present.smooth or least < LEAST else BEYOND))
+    enough = max(LEAST, least + (0 if present.smooth or least < LEAST else BEYOND))
+    further = near.part >= enough and (near.met or near.part < 1 - LEAST)  # not dimmed, which is beside the line
     fresh = DraggedStack.of(near.stack.stack, wish, present.model, with_pins=True) if further else None
     if fresh is None:
         return None
