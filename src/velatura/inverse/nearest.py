@@ -9,6 +9,7 @@ replaced by its mean. And a metal as bright as can be that is to be blurred more
 from __future__ import annotations
 
 import dataclasses
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -141,12 +142,12 @@ def _colour_lost(present: DraggedStack, wish: Target, possible: Target) -> str |
 
 
 def _along(
-    start: DraggedStack, now: Target, wish: Target, quick: bool
+    start: DraggedStack, now: Target, wish: Target, quick: bool, readings: Sequence[int] = READINGS
 ) -> tuple[DraggedStack, Bound | None, float, bool]:
     """The last stack on the line to a wish, the bound there, the part of the way, and whether the search ended."""
     here, goal = _readings(start, now, now), _readings(start, now, wish)
     line = _line(start, here, goal, wish, quick)
-    found = line.last(READINGS)
+    found = line.last(readings)
     if found.off >= line.allowed or found.part >= 1 + line.allowed:
         found = Reached(start.point, 0.0, 0.0, found.bound, settled=False)
     stack = dataclasses.replace(start, point=found.point).renamed(wish)
@@ -194,13 +195,14 @@ def _by_closed_form(
     leads further than a part of the way. Where that is a way, the answer must lie well beyond it: by an index on the
     other side of that above, which no line leads to."""
     near = nearest(present.quickly, wish)
-    enough = max(LEAST, least + (0 if present.smooth or least < LEAST else BEYOND))
-    further = near.part >= enough and (near.met or near.part < 1 - LEAST)  # not dimmed, which is beside the line
+    further = near.part >= max(LEAST, least + (0 if present.smooth or least < LEAST else BEYOND))
     fresh = DraggedStack.of(near.stack.stack, wish, present.model, with_pins=True) if further else None
     if fresh is None:
         return None
     fresh = dataclasses.replace(fresh, tail=present.tail, name=present.name, diffuse=present.diffuse)
-    found, bound, part, _ = _along(fresh, now, wish, quick)
+    found, bound, part, _ = _along(fresh, now, wish, True, READINGS[:1])
+    if part >= max(LEAST, least) and not quick:
+        found, bound, part, _ = _along(found, now, wish, False)
     return (found, bound, part) if part >= max(LEAST, least) else None
 
 
