@@ -397,7 +397,7 @@ class _Search:
     def refine(self, line: Line, readings: int) -> None:
         """Read at most so many points more, until they miss no more than the line allows."""
         self.line = line
-        if not self.settled:
+        if not self.settled or self.seen[-1][0].off > QUICKLY_ON_LINE:
             self.base, self.landing, self.lower = self.best, True, LOWER
             self._aimed(self.base[1], self.base[0].part, self.base[0].off)
         self.best = max(self.seen, key=lambda each: line._worth(each[0]))
