@@ -79,7 +79,8 @@ def nearest(present: DraggedStack, wish: Target, now: Target | None = None, quic
     grey = _colour_lost(present, wish, possible)
     if present.missed(possible, present.space.counted) < EXACT:
         return _told(Nearest(present.renamed(possible), wish), grey)
-    now = now or present.now(possible)
+    if now is None or present.missed(now) <= UNLIKE:
+        now = present.now(possible)
     found, bound, part, settled = _along(present, now, possible, quick)
     if bound is not None and (other := _elsewhere(present, possible, quick)) is not None:
         found, bound, part = other, None, 1.0
