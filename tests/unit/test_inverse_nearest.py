@@ -98,6 +98,18 @@ def test_a_closed_form_gives_one_answer_under_the_hand_and_at_rest() -> None:
     assert not rest.met and hand.exact and hand.part == rest.part
 
 
+def test_an_index_on_the_other_side_of_that_above_is_found() -> None:
+    """An interface reflects less than wished by any lower index, down to 1, where the line to the wish ends; by one of
+    4 it reflects nearly as much. Expected: that, under the hand and at rest."""
+    metal = vt.Interface(eta=(1.124, 1.122, 1.068), k=(1.39, 1.388, 1.27), alpha=0.45)
+    stack, model = Stack([vt.Interface(eta=1.505), vt.Interface(eta=1.143, alpha=0.19), metal]), named("velatura")
+    now = seen(stack, Target([{"energy": 0.1}, {"energy": 0.1}, {"energy": 0.1, "base": "conductor"}]), model)
+    wish = now.with_energy(1, (0.157, 0.157, 0.157))
+    hand, rest = (answer(stack, wish, model, quick=quick) for quick in (True, False))
+    assert hand.part == pytest.approx(rest.part, abs=2e-3) and rest.part > 0.9
+    assert rest.stack.stack.interfaces[1].eta == pytest.approx(4, abs=0.01)
+
+
 def test_rounding_of_the_present_stack_does_not_change_an_answer() -> None:
     """Expected: of coordinates that differ by 1e-14, the same stack to the last digit, far from the present one."""
     coated = Stack([vt.Interface(eta=1.4, alpha=0.1), vt.Medium(sigma_a=0.1), vt.Interface(eta=0.5, k=3, alpha=0.2)])
