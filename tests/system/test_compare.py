@@ -209,10 +209,14 @@ def test_command_line(run: Run, tmp_path: Path) -> None:
 
 @pytest.mark.usefixtures("few")
 def test_pictures_have_an_error_and_a_place_in_the_figure(tmp_path: Path) -> None:
-    told: list[tuple[int, int]] = []
+    reported: list[tuple[int, int]] = []
     models = ["velatura", "belcour2018"]
-    found = vt.compare(Stack([METAL]), models, [1.0, 0.5], 1000, pictures=True, progress=lambda *at: told.append(at))
-    assert told == [(done, 6 + 2 + len(models)) for done in range(1, told[0][1] + 1)]
+
+    def report(done: int, total: int) -> None:
+        reported.append((done, total))
+
+    found = vt.compare(Stack([METAL]), models, [1.0, 0.5], 1000, pictures=True, progress=report)
+    assert reported == [(done, 6 + 2 + len(models)) for done in range(1, reported[0][1] + 1)]
     assert found.pictures and found.pictures.truth.shape == (16, 24, 3)
     assert found.to_dict()["models"]["belcour2018"]["rmse"] == pytest.approx(found.pictures.noise, rel=2)
     save_figure(found, tmp_path / "figure.svg")

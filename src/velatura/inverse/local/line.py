@@ -352,10 +352,10 @@ class _Search:
     aims at a part of the way: by how far it got, then on from there, in steps like the last ones. In the end it leads
     back to the line. All of this is the same for all answers; for an exact one, the search goes on from there.
 
-    read: the points that corrections follow from. seen: all points so far, and where they are. base, best: the last
-    point near the line, and the best one. aim: part of the way. step: the length of steps. last: what was missed
-    before, infinite of a new aim. landing, stuck: whether it leads back to the line, and whether it has begun anew from
-    where it stood still. lower: by how much less is aimed at next where it does not get nearer to the line.
+    read: the points that corrections follow from. seen: all points so far, and where they are. base: the last point
+    near the line. aim: part of the way. step: the length of steps. last: what was missed before, infinite of a new aim.
+    landing, stuck: whether it leads back to the line, and whether it has begun anew from where it stood still. lower:
+    by how much less is aimed at next where it does not get nearer to the line.
     """
 
     line: Line
@@ -363,7 +363,6 @@ class _Search:
     read: list[_Read]
     seen: list[tuple[Reached, _Read]]
     base: tuple[Reached, _Read]
-    best: tuple[Reached, _Read]
     correction: _Correction
     aim: float = 1.0
     step: float = 1.0
@@ -380,7 +379,12 @@ class _Search:
         first = _Read(x, value, space.quickly.read(x[:, None])[:, 0])
         line = dataclasses.replace(line, enough=max(line.enough, QUICK))
         begun = line._reached(x, value), first
-        return cls(line, whole, [first], [begun], begun, begun, _Correction.fitted(space, [first], first))
+        return cls(line, whole, [first], [begun], begun, _Correction.fitted(space, [first], first))
+
+    @property
+    def best(self) -> tuple[Reached, _Read]:
+        """The best point so far."""
+        return max(self.seen, key=lambda each: self.line._worth(each[0]))
 
     def go(self, readings: int) -> None:
         """Read at most so many points, from the best one so far."""
@@ -396,11 +400,10 @@ class _Search:
 
     def refine(self, line: Line, readings: int) -> None:
         """Read at most so many points more, until they miss no more than the line allows."""
-        self.line = line
+        best, self.line = self.best, line
         if not self.settled or self.seen[-1][0].off > QUICKLY_ON_LINE:
-            self.base, self.landing, self.lower = self.best, True, LOWER
+            self.base, self.landing, self.lower = best, True, LOWER
             self._aimed(self.base[1], self.base[0].part, self.base[0].off)
-        self.best = max(self.seen, key=lambda each: line._worth(each[0]))
         for _ in range(readings):
             if self._ends():
                 return
@@ -420,7 +423,6 @@ class _Search:
         there = line._reached(x, value)
         self.read.append(now)
         self.seen.append((there, now))
-        self.best = max(self.best, (there, now), key=lambda each: line._worth(each[0]))
         astray = missed > (ASTRAY if self.last == np.inf else max(FOLLOWED, SLOWLY * self.last))
         self.settled = max(missed, nearly) < enough and (self.aim == 1 or abs(hoped - self.aim) > enough)
         if self.settled and there.off > self.line.allowed and not self.stuck:
