@@ -425,10 +425,12 @@ class _Search:
         self.seen.append((there, now))
         astray = missed > (ASTRAY if self.last == np.inf else max(FOLLOWED, SLOWLY * self.last))
         self.settled = max(missed, nearly) < enough and (self.aim == 1 or abs(hoped - self.aim) > enough)
-        if self.settled and there.off > self.line.allowed and not self.stuck:
-            self.stuck, self.read = True, [now]
-            self._aimed(now, self.aim)
-            return False
+        if self.settled and there.off > self.line.allowed:
+            if not self.stuck:
+                self.stuck, self.read = True, [now]
+                self._aimed(now, self.aim)
+                return False
+            self.settled, astray = False, not self.landing
         if self.settled or (self.landing and there.off < enough):
             return True
         if self.whole and (astray or (missed < NEAR and hoped < 1 - FOLLOWED)):
