@@ -17,7 +17,7 @@ import numpy as np
 from velatura.inverse.lobes.target import Target
 from velatura.inverse.local.coordinates import Bound
 from velatura.inverse.local.dragged import DraggedStack
-from velatura.inverse.local.line import EXACT, QUICK, Line, Reached
+from velatura.inverse.local.line import EXACT, QUICK, Line, Reached, rounded
 from velatura.inverse.reasons import because
 from velatura.inverse.solution import EFFORTS, in_closed_form
 from velatura.stack import Stack
@@ -74,7 +74,7 @@ def nearest(present: DraggedStack, wish: Target, now: Target | None = None, quic
     """
     quick = quick and present.space.slow
     if present.space.slow:
-        present = present.at(_short(present.point.x))
+        present = present.at(rounded(present.point.x, DIGITS))
     possible = present.achromatic(wish)
     grey = _colour_lost(present, wish, possible)
     if present.missed(possible, present.space.counted) < EXACT:
@@ -98,12 +98,6 @@ def nearest(present: DraggedStack, wish: Target, now: Target | None = None, quic
     if bound is not None:
         return dataclasses.replace(answer, lobe=bound.lobe, reason=_named(bound, wish))
     return _told(answer, grey or _colour_lost(present, wish, found.now(wish) if present.coloured else possible))
-
-
-def _short(x: np.ndarray) -> np.ndarray:
-    """Coordinates of `DIGITS` digits. A search of many steps may end elsewhere from a stack that differs by rounding,
-    as one does that was written to a file and read."""
-    return np.array([float(f"{each:.{DIGITS}g}") for each in x])
 
 
 def _told(answer: Nearest, grey: str | None) -> Nearest:

@@ -32,11 +32,12 @@ NEARLY, INNER, COARSE = 0.1, 5e-3, 1e-3  # of that, and of the last miss, what t
 FOLLOWED, ASTRAY = 0.05, 0.5  # misses that are small, and first ones that lead nowhere
 SLOWLY, NEAR = 0.7, 0.015  # the share of the last miss that is no progress, and misses from which the way goes on
 SEEN, BACK = 0.03, 0.7  # of the way that is gone astray: the least that counts, and the share to go
-FURTHER_ON, ONWARDS, SHORT = 2.0, 0.02, 5e-3  # steps along the line: by an easy last one, anew, and the least
+FURTHER_ON, ONWARDS, SHORT = 2.0, 0.02, 2e-3  # steps along the line: by an easy last one, anew, and the least
 LANDING, LOWER = 4, 0.01  # readings that lead back to the line, and by how much less is aimed at first if they do not
 FOLDED = 1 - 1e-3  # the largest variance, folded, that a correction leads to
 BENT, ROUNDED = 0.5, 1e-9  # by how much corrections are off their slopes: share of the square of a distance, and least
 BESIDE = 10.0  # part of the way that it is worth to be as much nearer to the line
+DIGITS = 7  # of readings of a slow model
 
 
 @dataclass(frozen=True)
@@ -84,15 +85,16 @@ class Line:
             correction = _Correction.none(space, x)
             x, _ = self._followed(space, x, correction, MET)
             return self._bounded(self._reached(x, space.read(x[:, None])[:, 0]), correction)
-        search = _Search.of(self, whole)
+        line = dataclasses.replace(self, origin=rounded(self.origin, DIGITS), goal=rounded(self.goal, DIGITS))
+        search = _Search.of(line, whole)
         for most in readings:
             search.go(most)
             if search.settled or whole:
                 break
         if self.enough < QUICK and (search.settled or not whole):
-            search.refine(self, readings[0])
+            search.refine(line, readings[0])
         reached, read = search.best
-        found = self._bounded(reached, _Correction.fitted(space, search.read, read))
+        found = line._bounded(reached, _Correction.fitted(space, search.read, read))
         return dataclasses.replace(found, settled=search.settled)
 
     def _aimed(self, part: float) -> Line:
@@ -375,7 +377,7 @@ class _Search:
     @classmethod
     def of(cls, line: Line, whole: bool) -> _Search:
         """The search from the start of a line."""
-        space, x, value = line.start.space, line.start.x, line.start.reading.value
+        space, x, value = line.start.space, line.start.x, rounded(line.start.reading.value, DIGITS)
         first = _Read(x, value, space.quickly.read(x[:, None])[:, 0])
         line = dataclasses.replace(line, enough=max(line.enough, QUICK))
         begun = line._reached(x, value), first
@@ -418,7 +420,8 @@ class _Search:
         line, enough = self.line, self.line.enough
         nearly = min(max(INNER * self.last, NEARLY * enough), COARSE)
         x, near = line._aimed(self.aim)._followed(line.start.space.quickly, self.correction.x, self.correction, nearly)
-        value, expected = line.start.space.read(x[:, None])[:, 0], self.correction.value_of(x, near)
+        value = rounded(line.start.space.read(x[:, None])[:, 0], DIGITS)
+        expected = self.correction.value_of(x, near)
         now, missed, hoped = _Read(x, value, near), line._apart(value, expected), line.placed(expected)[0]
         there = line._reached(x, value)
         self.read.append(now)
@@ -459,6 +462,12 @@ class _Search:
     def _stepped(self) -> None:
         """Aim one step further than the base."""
         self._aimed(self.base[1], self.base[0].part + self.step)
+
+
+def rounded(x: Array, digits: int) -> Array:
+    """Numbers of so many digits. A search of many steps may end elsewhere where a number differs by rounding, as those do
+    that are written to a file and read, or computed by kernels and by NumPy."""
+    return np.array([float(f"{each:.{digits}g}") for each in x])
 
 
 def _seen(x: Array, least: Array, folded: Mask) -> Array:
