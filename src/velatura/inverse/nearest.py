@@ -17,13 +17,13 @@ import numpy as np
 from velatura.inverse.lobes.target import Target
 from velatura.inverse.local.coordinates import Bound
 from velatura.inverse.local.dragged import DraggedStack
-from velatura.inverse.local.line import EXACT, QUICK, Line, Reached, rounded
+from velatura.inverse.local.line import EXACT, QUICK, Line, Reached
 from velatura.inverse.reasons import because
 from velatura.inverse.solution import EFFORTS, in_closed_form
 from velatura.stack import Stack
 
 EFFORT = EFFORTS[:1]  # to find a stack that is not near
-READINGS = 16, 24  # of a slow model, for one line
+READINGS = 16, 24, 24, 24, 24  # of a slow model, for one line
 SAME = 1e-5  # difference of roughnesses of a blur that stays
 CLOSE = 0.05  # part of the way from which a wish is met by itself
 UNLIKE = 1e-3  # energy or variance by which a stack differs from the nearest that can be dragged, and is taken itself
@@ -74,7 +74,7 @@ def nearest(present: DraggedStack, wish: Target, now: Target | None = None, quic
     """
     quick = quick and present.space.slow
     if present.space.slow:
-        present = present.at(rounded(present.point.x, DIGITS))
+        present = present.rounded(DIGITS)
     possible = present.achromatic(wish)
     grey = _colour_lost(present, wish, possible)
     if present.missed(possible, present.space.counted) < EXACT:

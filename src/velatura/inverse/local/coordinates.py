@@ -90,6 +90,11 @@ class InterfaceCoordinates:
     turn: Array | None = None
     pivot: Array | None = None
 
+    def rounded(self, digits: int) -> InterfaceCoordinates:
+        """The same, numbers that are kept rounded to so many digits."""
+        kept = {name: value for name, value in vars(self).items() if isinstance(value, np.ndarray)}
+        return dataclasses.replace(self, **{name: rounded(value, digits) for name, value in kept.items()})
+
 
 @dataclass(frozen=True)
 class Bound:
@@ -454,6 +459,12 @@ class Point:
     def layers(self) -> list[Layers]:
         """Its interfaces, each with the medium above it."""
         return self.space.layers(self.x[:, None])
+
+
+def rounded(x: Array, digits: int) -> Array:
+    """Numbers of so many digits. A search of many steps may end elsewhere where a number differs by rounding, as those
+    do that are written to a file and read, or computed by kernels and by NumPy."""
+    return np.array([float(f"{each:.{digits}g}") for each in x.flat]).reshape(x.shape)
 
 
 def units(x: Array) -> Array:

@@ -25,6 +25,7 @@ from velatura.inverse.local.coordinates import (
     Space,
     plain,
     retinted,
+    rounded,
 )
 from velatura.inverse.local.newton import Compromise, Problem
 from velatura.inverse.reasons import UNMET
@@ -101,6 +102,11 @@ class DraggedStack:
     def at(self, x: Array | None = None, space: Space | None = None) -> DraggedStack:
         """The stack at another point, or in another space."""
         return dataclasses.replace(self, point=Point(space or self.space, self.point.x if x is None else x))
+
+    def rounded(self, digits: int) -> DraggedStack:
+        """The stack by numbers of so many digits."""
+        interfaces = tuple(each.rounded(digits) for each in self.space.interfaces)
+        return self.at(rounded(self.point.x, digits), dataclasses.replace(self.space, interfaces=interfaces))
 
     def renamed(self, target: Target) -> DraggedStack:
         """The stack, as what has the lobes of another target of this form."""

@@ -16,7 +16,7 @@ import numpy as np
 from velatura import ops
 from velatura.inverse.lobes.partial_stack import Array, Mask
 from velatura.inverse.local.approach import FURTHER, LITTLE, step_within
-from velatura.inverse.local.coordinates import SLACK, Bound, Point, Reading, Space, units
+from velatura.inverse.local.coordinates import SLACK, Bound, Point, Reading, Space, rounded, units
 
 ALONG = (1.0, 1e-4)  # weights of the way along the line, beside 1 of what leads off it: at first, and in the end
 ROUNDS, CLOSE = 16, 1e-3  # of steps, and the shortest
@@ -35,9 +35,12 @@ SEEN, BACK = 0.03, 0.7  # of the way that is gone astray: the least that counts,
 FURTHER_ON, ONWARDS, SHORT = 2.0, 0.02, 2e-3  # steps along the line: by an easy last one, anew, and the least
 LANDING, LOWER = 4, 0.01  # readings that lead back to the line, and by how much less is aimed at first if they do not
 FOLDED = 1 - 1e-3  # the largest variance, folded, that a correction leads to
-BENT, ROUNDED = 0.5, 1e-9  # by how much corrections are off their slopes: share of the square of a distance, and least
-BESIDE = 10.0  # part of the way that it is worth to be as much nearer to the line
 DIGITS = 7  # of readings of a slow model
+BENT, ROUNDED = (
+    0.5,
+    10**-DIGITS,
+)  # by how much corrections are off their slopes: share of the square of a distance, least
+BESIDE = 10.0  # part of the way that it is worth to be as much nearer to the line
 
 
 @dataclass(frozen=True)
@@ -76,25 +79,25 @@ class Line:
         Of a model that is slow, the nearest one that adds up layers is followed, corrected by what the two differ by at
         the points that are read (space mapping, Bandler et al. 1994): see `_Search`.
 
-        readings: of a slow model, at most, of one search and of those that go on from where the last one ended; as many
-        as the first may follow until the point is exact, if that is asked for. whole: whether only all of the way
-        counts, so that a search ends where it leads astray, or where its end is in sight.
+        readings: of a slow model, at most, of one search and of those that go on from where the last one ended, unless
+        that got nowhere; as many as the first may follow until the point is exact, if that is asked for. whole: whether
+        only all of the way counts, so that a search ends where it leads astray, or where its end is in sight.
         """
         space, x = self.start.space, self.start.x
         if not space.slow:
             correction = _Correction.none(space, x)
             x, _ = self._followed(space, x, correction, MET)
             return self._bounded(self._reached(x, space.read(x[:, None])[:, 0]), correction)
-        line = dataclasses.replace(self, origin=rounded(self.origin, DIGITS), goal=rounded(self.goal, DIGITS))
-        search = _Search.of(line, whole)
-        for most in readings:
+        search = _Search.of(self, whole)
+        for n, most in enumerate(readings):
+            before = search.best[0].part
             search.go(most)
-            if search.settled or whole:
+            if search.settled or whole or (n and search.best[0].part < before + ONWARDS):
                 break
         if self.enough < QUICK and (search.settled or not whole):
-            search.refine(line, readings[0])
+            search.refine(self, readings[0])
         reached, read = search.best
-        found = line._bounded(reached, _Correction.fitted(space, search.read, read))
+        found = self._bounded(reached, _Correction.fitted(space, search.read, read))
         return dataclasses.replace(found, settled=search.settled)
 
     def _aimed(self, part: float) -> Line:
@@ -379,7 +382,8 @@ class _Search:
         """The search from the start of a line."""
         space, x, value = line.start.space, line.start.x, rounded(line.start.reading.value, DIGITS)
         first = _Read(x, value, space.quickly.read(x[:, None])[:, 0])
-        line = dataclasses.replace(line, enough=max(line.enough, QUICK))
+        origin, goal = rounded(line.origin, DIGITS), rounded(line.goal, DIGITS)
+        line = dataclasses.replace(line, enough=max(line.enough, QUICK), origin=origin, goal=goal)
         begun = line._reached(x, value), first
         return cls(line, whole, [first], [begun], begun, _Correction.fitted(space, [first], first))
 
@@ -394,6 +398,8 @@ class _Search:
             self.base, self.landing, self.step = self.best, False, ONWARDS
             self._aimed(self.base[1], self.base[0].part + self.step)
         for left in range(readings, 0, -1):
+            if self.step < SHORT and self.base[0].part <= 0:
+                return
             if not self.landing and self.base[0].part > 0 and (left <= LANDING or self.step < SHORT):
                 self.landing = True
                 self._aimed(self.base[1], self.base[0].part, self.base[0].off)
@@ -420,8 +426,8 @@ class _Search:
         line, enough = self.line, self.line.enough
         nearly = min(max(INNER * self.last, NEARLY * enough), COARSE)
         x, near = line._aimed(self.aim)._followed(line.start.space.quickly, self.correction.x, self.correction, nearly)
-        value = rounded(line.start.space.read(x[:, None])[:, 0], DIGITS)
-        expected = self.correction.value_of(x, near)
+        value, expected = line.start.space.read(x[:, None])[:, 0], self.correction.value_of(x, near)
+        value = value if enough < QUICK else rounded(value, DIGITS)
         now, missed, hoped = _Read(x, value, near), line._apart(value, expected), line.placed(expected)[0]
         there = line._reached(x, value)
         self.read.append(now)
@@ -462,12 +468,6 @@ class _Search:
     def _stepped(self) -> None:
         """Aim one step further than the base."""
         self._aimed(self.base[1], self.base[0].part + self.step)
-
-
-def rounded(x: Array, digits: int) -> Array:
-    """Numbers of so many digits. A search of many steps may end elsewhere where a number differs by rounding, as those do
-    that are written to a file and read, or computed by kernels and by NumPy."""
-    return np.array([float(f"{each:.{digits}g}") for each in x])
 
 
 def _seen(x: Array, least: Array, folded: Mask) -> Array:
