@@ -30,7 +30,7 @@ from velatura.inverse import (
     plots,
 )
 from velatura.inverse.explain import why_not
-from velatura.inverse.lobes import pair
+from velatura.inverse.lobes import pair, sampling
 from velatura.inverse.solution import in_closed_form
 from velatura.model import MODELS, Model, named
 from velatura.model.variance import Isotropic, Roughness
@@ -806,3 +806,19 @@ def test_what_is_fixed_of_three_interfaces_stays() -> None:
     values = found.stack.flat()
     assert (values["layer0_eta"], values["layer1_sigma_a"]) == (pytest.approx(1.5), pytest.approx(0.1))
     assert max(read(found.target, found.stack, AVERAGED)) < 1e-6
+
+
+@pytest.mark.parametrize(
+    "below",
+    [
+        [{"energy": 0.1, "alpha": 0.4, "interfaces": 3}],
+        [{"energy": 0.2, "alpha": 0.5, "interfaces": 3}, {"energy": 0.2, "alpha": 0.6, "base": "conductor"}],
+    ],
+)
+def test_stacks_above_lobes_of_three_interfaces_keep_their_indices(below: list[dict[str, Any]]) -> None:
+    """Of a lobe of three interfaces, what has no solution is left out. Expected: the index of each stack that is left is
+    the one that it was asked for."""
+    target, asked = Target([{"energy": 0.05, "alpha": 0.2, "interfaces": 2}, *below]), np.geomspace(1.05, 3.9, 50)
+    paths, origin, _ = sampling._along(target, named("bati2021"), {0: asked})
+    assert len(origin) > 10
+    np.testing.assert_array_equal(np.broadcast_to(paths.layers[0].eta, (1, len(origin)))[0], asked[origin])

@@ -98,14 +98,14 @@ def why_not(target: Target, model: Model) -> tuple[int, str]:
     (spread, keep), search = EFFORT[-1], Search(model)
     paths = stacks.beginning(target, model)
     for n, lobe in enumerate(target.lobes):
-        above, tried = paths, stacks.extended(paths, lobe, target, spread, first=n == 0)
+        above, tried = paths, stacks.extended(paths, lobe, target, spread, first=n == 0)[0]
         paths = stacks.pruned(tried, lobe.interfaces, keep)
         if len(paths.cost):
             continue
         free = lobe.model_copy(update={"fixed": lobe.fixed.films_alone})
         if free != lobe:
             # What is fixed is the reason only if there is a stack without it
-            without = stacks.extended(above, free, target, spread, first=n == 0)
+            without, _ = stacks.extended(above, free, target, spread, first=n == 0)
             if not len(stacks.pruned(without, free.interfaces, keep).cost):
                 tried, lobe = without, free
         first, reasons = target.model_copy(update={"lobes": target.lobes[: n + 1]}), _violated(tried, lobe)

@@ -103,9 +103,8 @@ def _along(target: Target, model: Model, indices: Mapping[int, Array]) -> tuple[
         given = indices[n][origin] if n in indices else None
         if lobe.interfaces == 2 and given is None:
             given = np.full(len(origin), lobe.fixed.of("eta", 0))
-        paths = stacks.extended(paths, lobe, target, 1, n == 0, given)
-        # Both sides of a dielectric follow each other
-        origin = np.tile(origin, len(paths.cost) // len(origin))
+        paths, above = stacks.extended(paths, lobe, target, 1, n == 0, given)
+        origin = origin[above]
         margins = [margin for part in paths.layers[-lobe.interfaces :] for margin in part.margins.values()]
         margin = np.nan_to_num(np.min(np.broadcast_arrays(paths.cost * np.inf, *margins), axis=0), nan=-np.inf)
         margin = np.maximum(margin, -1e9)

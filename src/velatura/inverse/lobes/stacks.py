@@ -56,7 +56,7 @@ def follow(target: Target, model: Model, spread: int, keep: int, known: Known | 
         if known and first in known:
             paths = known[first]
         else:
-            paths = pruned(extended(paths, lobe, target, spread, first=n == 0), lobe.interfaces, keep)
+            paths = pruned(extended(paths, lobe, target, spread, first=n == 0)[0], lobe.interfaces, keep)
             if known is not None and n < last:
                 known[first] = paths
         yield paths
@@ -93,10 +93,10 @@ def class_of(above: Above, lobe: TargetLobe, target: Target, first: bool) -> Equ
 
 def extended(
     paths: Partial, lobe: TargetLobe, target: Target, spread: int, first: bool, given: Array | None = None
-) -> Partial:
-    """All partial stacks with all free choices of a lobe, feasible or not; `given`: an index between two interfaces for
-    each, (N,)."""
-    energy = np.array(lobe.colour)[:, None]
+) -> tuple[Partial, np.ndarray]:
+    """All partial stacks with all free choices of a lobe, feasible or not, and which of those above each has, (M,);
+    `given`: an index between two interfaces for each, (N,)."""
+    energy, above = np.array(lobe.colour)[:, None], np.arange(len(paths.cost))
     choice = choice_of(lobe, target, first)
 
     # Let indices between interfaces run, that of the medium above included, where the upper one vanishes
@@ -115,19 +115,20 @@ def extended(
             index, eta = _of_fixed_roughness(paths, lobe, _variance(paths, lobe), choice, tried)
         left = take(energy, index, count)
         paths, energy = with_upper(paths.take(index), lobe, n, left, target, eta[None], pinned_above(lobe, n))
+        above = above[index]
         possible = np.broadcast_to(paths.layers[-1].feasible, paths.cost.shape)
         if possible.any():  # what the others leave takes long to solve for
             kept = np.flatnonzero(possible)
             kept = kept[np.linspace(0, len(kept) - 1, min(len(kept), TRIED)).astype(int)] if n else kept
-            paths, energy = paths.take(kept), take(energy, kept, len(possible))
+            paths, energy, above = paths.take(kept), take(energy, kept, len(possible)), above[kept]
 
     # Take either index of the interface that gives what is left
     if choice.kind == "dielectric" and choice.eta is None:
         count = len(paths.cost)
         index = np.tile(np.arange(count), 2)
-        paths, energy = paths.take(index), take(energy, index, count)
+        paths, energy, above = paths.take(index), take(energy, index, count), above[index]
         choice = dataclasses.replace(choice, side=np.repeat([DENSER, RARER], count))
-    return with_last(paths, energy, lobe, choice)
+    return with_last(paths, energy, lobe, choice), above
 
 
 def with_upper(

@@ -96,8 +96,9 @@ class Line:
                 break
         if self.enough < QUICK and (search.settled or not whole):
             search.refine(self, readings[0])
-        reached, read = search.best
-        found = self._bounded(reached, _Correction.fitted(space, search.read, read))
+        _, best = search.best
+        best = dataclasses.replace(best, value=best.exact)
+        found = self._bounded(self._reached(best.x, best.value), _Correction.fitted(space, search.read, best))
         return dataclasses.replace(found, settled=search.settled)
 
     def _aimed(self, part: float) -> Line:
@@ -277,10 +278,11 @@ class Line:
 
 @dataclass(frozen=True)
 class _Read:
-    """A point (D,), and the readings (R,) of a slow model and of the one in its place."""
+    """A point (D,), and the readings (R,) of a slow model, rounded and exact, and of the one in its place."""
 
     x: Array
     value: Array
+    exact: Array
     near: Array
 
 
@@ -380,8 +382,9 @@ class _Search:
     @classmethod
     def of(cls, line: Line, whole: bool) -> _Search:
         """The search from the start of a line."""
-        space, x, value = line.start.space, line.start.x, rounded(line.start.reading.value, DIGITS)
-        first = _Read(x, value, space.quickly.read(x[:, None])[:, 0])
+        space, x, exact = line.start.space, line.start.x, line.start.reading.value
+        value = rounded(exact, DIGITS)
+        first = _Read(x, value, exact, space.quickly.read(x[:, None])[:, 0])
         origin, goal = rounded(line.origin, DIGITS), rounded(line.goal, DIGITS)
         line = dataclasses.replace(line, enough=max(line.enough, QUICK), origin=origin, goal=goal)
         begun = line._reached(x, value), first
@@ -426,9 +429,9 @@ class _Search:
         line, enough = self.line, self.line.enough
         nearly = min(max(INNER * self.last, NEARLY * enough), COARSE)
         x, near = line._aimed(self.aim)._followed(line.start.space.quickly, self.correction.x, self.correction, nearly)
-        value, expected = line.start.space.read(x[:, None])[:, 0], self.correction.value_of(x, near)
-        value = value if enough < QUICK else rounded(value, DIGITS)
-        now, missed, hoped = _Read(x, value, near), line._apart(value, expected), line.placed(expected)[0]
+        exact, expected = line.start.space.read(x[:, None])[:, 0], self.correction.value_of(x, near)
+        value = exact if enough < QUICK else rounded(exact, DIGITS)
+        now, missed, hoped = _Read(x, value, exact, near), line._apart(value, expected), line.placed(expected)[0]
         there = line._reached(x, value)
         self.read.append(now)
         self.seen.append((there, now))
