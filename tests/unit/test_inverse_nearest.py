@@ -114,8 +114,8 @@ def test_an_index_on_the_other_side_of_that_above_is_found() -> None:
 def test_rounding_does_not_change_an_answer(monkeypatch: pytest.MonkeyPatch) -> None:
     """Of a stack that is written and read again, and of readings, which kernels and NumPy give to 1e-13.
 
-    Expected: of indices that differ by 1e-14, and readings by 1e-13 at random, the same stack under the hand to the last
-    digit, far from the present one.
+    Expected: of indices that differ by 1e-14, and readings by 1e-13 at random, the same stack under the hand to the
+    last digit, far from the present one.
     """
     model, rng, read = named("velatura"), np.random.default_rng(0), Space._solved
 

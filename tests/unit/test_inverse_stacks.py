@@ -816,8 +816,8 @@ def test_what_is_fixed_of_three_interfaces_stays() -> None:
     ],
 )
 def test_stacks_above_lobes_of_three_interfaces_keep_their_indices(below: list[dict[str, Any]]) -> None:
-    """Of a lobe of three interfaces, what has no solution is left out. Expected: the index of each stack that is left is
-    the one that it was asked for."""
+    """Of a lobe of three interfaces, what has no solution is left out. Expected: the index of each stack that is left
+    is the one that it was asked for."""
     target, asked = Target([{"energy": 0.05, "alpha": 0.2, "interfaces": 2}, *below]), np.geomspace(1.05, 3.9, 50)
     paths, origin, _ = sampling._along(target, named("bati2021"), {0: asked})
     assert len(origin) > 10
