@@ -92,8 +92,10 @@ class InterfaceCoordinates:
 
     def rounded(self, digits: int) -> InterfaceCoordinates:
         """The same, numbers that are kept rounded to so many digits."""
-        kept = {name: value for name, value in vars(self).items() if isinstance(value, np.ndarray)}
-        return dataclasses.replace(self, **{name: rounded(value, digits) for name, value in kept.items()})
+        kept: dict[str, Any] = {
+            name: rounded(value, digits) for name, value in vars(self).items() if isinstance(value, np.ndarray)
+        }
+        return dataclasses.replace(self, **kept)
 
 
 @dataclass(frozen=True)
