@@ -194,7 +194,7 @@ def _capped(space: Space, x: Array) -> Array:
             ends = np.exp([bound.at for bound in space.bounds if bound.interface == n])
             end = max(ends) if own.side > 0 else min(ends)
             x[own.reflectances] = np.minimum(x[own.reflectances], fresnel.normal_incidence(end / above))
-            above = float(np.mean(space.layers(x[:, None])[n].eta))
+            above = space.index(x, n)
     return x
 
 

@@ -11,6 +11,7 @@ import dataclasses
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
+from itertools import islice
 from typing import Any
 
 import numpy as np
@@ -165,6 +166,11 @@ class Space:
             )
             for own, (eta, kappa, tau) in zip(self.interfaces, self._values(x))
         ]
+
+    def index(self, x: Array, n: int) -> float:
+        """The index of the n-th interface, a dielectric, at a point (D,)."""
+        eta, *_ = next(islice(self._values(x[:, None]), n, None))
+        return float(np.mean(eta))
 
     def _values(self, x: Array) -> Iterator[tuple[Array, Array | None, Value]]:
         """Absolute eta and kappa of each interface of N points, and the optical depths above it."""
