@@ -57,8 +57,8 @@ if [ "${1:-}" = dev ]; then
 fi
 
 # Install a browser, which the shaders are tested in
-if [ "${1:-}" = dev ] && ! command -v chromium chromium-browser google-chrome >/dev/null; then
-  (apt_install chromium chromium-browser) || say "without Chromium, tests/browser is skipped"
+if [ "${1:-}" = dev ] && ! command -v chromium-headless-shell chromium chromium-browser google-chrome >/dev/null; then
+  (apt_install chromium-headless-shell chromium chromium-browser) || say "without Chromium, tests/browser is skipped"
 fi
 
 # Install a compiler of shaders and devices on the CPU that run them, which languages of shaders are tested on

@@ -11,11 +11,21 @@ from typing import Any
 
 import numpy as np
 
+# Programs of earlier pages are found again, which SwiftShader compiles in most of the time of a page. The features are
+# those that Playwright turns off, whose list this one replaces, and a pop-up of the address bar, a page of its own
+# beside each window.
 FLAGS = (
     "--no-sandbox --disable-gpu --use-angle=swiftshader --enable-unsafe-swiftshader --disable-quic --no-first-run "
     "--disable-background-networking --disable-component-update --disable-sync "
-    "--enable-unsafe-webgpu --use-webgpu-adapter=swiftshader"
+    "--enable-unsafe-webgpu --use-webgpu-adapter=swiftshader --enable-angle-features=preferGlobalPipelineCache "
+    "--disable-features=AvoidUnnecessaryBeforeUnloadCheckSync,DestroyProfileOnBrowserClose,HttpsUpgrades,"
+    "HttpsFirstBalancedModeAutoEnable,LensOverlay,MediaRouter,PaintHolding,ThirdPartyStoragePartitioning,"
+    "AvoidCorsURLLoaderRestartOnRedirect,OptimizationHints,NetworkTimeServiceQuerying,AimEnabled,PreconnectToSearch,"
+    "WebUIOmniboxAimPopup"
 )
+
+# The first is without windows, toolbars and forms that are filled in, which take a third of the time of a test
+COMMANDS = "chromium-headless-shell", "chromium", "chromium-browser", "google-chrome"
 
 PAGE = """
 (job) => {
@@ -140,7 +150,7 @@ def missing() -> str:
 
 
 def path() -> str | None:
-    return shutil.which("chromium") or shutil.which("chromium-browser") or shutil.which("google-chrome")
+    return next(filter(None, map(shutil.which, COMMANDS)), None)
 
 
 @contextmanager
