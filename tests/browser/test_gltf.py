@@ -28,19 +28,22 @@ async (text) => {
   const found = [];
   scene.traverse((each) => each.isMesh && found.push(each));
   const [{ material, geometry }] = found;
-  const renderer = new THREE.WebGLRenderer({ alpha: true, preserveDrawingBuffer: true });
-  renderer.setSize(SIZE, SIZE, false);
-  const stage = new THREE.Scene(), camera = new THREE.OrthographicCamera(-1, 1, 1, -1, 0.1, 10);
-  const white = new THREE.DataTexture(new Uint8Array(4 * 4 * 2).fill(255), 4, 2);
-  white.mapping = THREE.EquirectangularReflectionMapping;
-  white.needsUpdate = true;
+  const camera = new THREE.OrthographicCamera(-1, 1, 1, -1, 0.1, 10), stage = new THREE.Scene();
+  if (!window.studio) {
+    // A renderer blurs an environment once, for seconds
+    const renderer = new THREE.WebGLRenderer({ alpha: true, preserveDrawingBuffer: true });
+    renderer.setSize(SIZE, SIZE, false);
+    const white = new THREE.DataTexture(new Uint8Array(4 * 4 * 2).fill(255), 4, 2);
+    white.mapping = THREE.EquirectangularReflectionMapping;
+    white.needsUpdate = true;
+    window.studio = { renderer, white };
+  }
+  const { renderer, white } = window.studio;
   stage.environment = white;
   stage.add(scene);
   camera.position.set(0, 1, 4);
   renderer.render(stage, camera);
   const picture = renderer.domElement.toDataURL('image/png').split(',')[1];
-  renderer.dispose();
-  renderer.forceContextLoss();
   const { name, type, metalness, roughness, clearcoat, clearcoatRoughness, anisotropy } = material;
   return {
     picture, meshes: found.length, tangents: 'tangent' in geometry.attributes,

@@ -36,9 +36,9 @@ def stage() -> Iterator[viewport.Stage]:
 @pytest.mark.parametrize(
     ("material", "scene", "size", "samples", "spp"),
     [
-        (BRUSHED, "ball", 16, 768, 1536),
-        (vt.preset("frosted-glass"), "sphere", 4, 24576, 24576),
-        (MATT, "ball", 16, 512, 2048),
+        (BRUSHED, "ball", 12, 768, 1536),
+        (vt.preset("frosted-glass"), "sphere", 3, 16384, 16384),
+        (MATT, "ball", 12, 512, 2048),
     ],
     ids=["brushed", "frosted", "matt"],
 )

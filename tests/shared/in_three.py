@@ -8,6 +8,7 @@ import re
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -39,12 +40,17 @@ _SCENE = """
 async (job) => {
   const THREE = await import('%s');
   const { LayeredMaterial } = await import(job.module);
-  const floats = new Float32Array(Uint8Array.from(atob(job.sky), (letter) => letter.charCodeAt(0)).buffer);
-  const sky = new THREE.DataTexture(floats, job.width, job.height, THREE.RGBAFormat, THREE.FloatType);
-  sky.mapping = THREE.EquirectangularReflectionMapping;
-  sky.minFilter = sky.magFilter = THREE.LinearFilter;
-  sky.wrapS = THREE.RepeatWrapping;
-  sky.needsUpdate = true;
+  // Each renderer blurs an environment once, for seconds
+  const skies = (window.skies ??= new Map());
+  if (!skies.has(job.sky)) {
+    const floats = new Float32Array(Uint8Array.from(atob(job.sky), (letter) => letter.charCodeAt(0)).buffer);
+    const sky = new THREE.DataTexture(floats, job.width, job.height, THREE.RGBAFormat, THREE.FloatType);
+    sky.mapping = THREE.EquirectangularReflectionMapping;
+    sky.minFilter = sky.magFilter = THREE.LinearFilter;
+    sky.wrapS = THREE.RepeatWrapping;
+    sky.needsUpdate = true;
+    skies.set(job.sky, sky);
+  }
   const scene = new THREE.Scene(), camera = new THREE.OrthographicCamera(-1, 1, 1, -1, 0.1, 10);
   camera.position.z = 4;
   const material = new LayeredMaterial();
@@ -64,7 +70,7 @@ async (job) => {
     light.position.set(...job.rectangle[2]);
     light.lookAt(0, 0, 0);
     scene.add(light);
-  } else scene.environment = sky;
+  } else scene.environment = skies.get(job.sky);
   const complaints = [];
 %s  let text = '';
   const bytes = new Uint8Array(pixels.buffer);
@@ -76,7 +82,7 @@ async (job) => {
 DRAW = _SCENE % (
     "three",
     """\
-  const renderer = new THREE.WebGLRenderer({ canvas: document.createElement('canvas') });
+  const renderer = (window.renderer ??= new THREE.WebGLRenderer({ canvas: document.createElement('canvas') }));
   renderer.debug.onShaderError = (gl, program, vertex, fragment) =>
     complaints.push(gl.getShaderInfoLog(vertex), gl.getShaderInfoLog(fragment), gl.getProgramInfoLog(program));
   const target = new THREE.WebGLRenderTarget(job.size, job.size, { type: THREE.FloatType });
@@ -85,12 +91,10 @@ DRAW = _SCENE % (
   renderer.render(scene, camera);
   const pixels = new Float32Array(4 * job.size * job.size);
   renderer.readRenderTargetPixels(target, 0, 0, job.size, job.size, pixels);
-  renderer.dispose();
-  renderer.forceContextLoss();
 """,
 )
 
-# One renderer for all balls, since it takes seconds to start; its rows come from the top
+# Its rows come from the top
 DRAW_BY_WEBGPU = _SCENE % (
     "three/webgpu",
     """\
@@ -293,6 +297,12 @@ def body_of(material: MaterialLike) -> SideBySide:
     return SideBySide.of([(1, Material.of(vt.load(material)))], named("velatura"))
 
 
+@cache
+def exported(material: str | vt.Stack, to: str) -> str:
+    """A module for an engine; what it reads of environments takes seconds to work out."""
+    return vt.export(material, to).text
+
+
 def by_the_model(material: MaterialLike, light: Array, pixels: Sequence[tuple[int, int]], size: int) -> Array:
     """Values of the model (pixels, 3) at rows and columns of the ball, for light from a direction."""
     body = body_of(material)
@@ -324,27 +334,27 @@ def by_rectangle(
     return np.array(found)
 
 
-def missed_by_rectangle(stage: Stage, material: MaterialLike, to: str) -> float:
+def missed_by_rectangle(stage: Stage, material: str | vt.Stack, to: str) -> float:
     """How far a ball under `LAMP`, by a module of a format, is from the model, as `matched` has it."""
-    found = stage.ball(vt.export(material, to).text, softbox(), SIZE, rectangle=LAMP)
+    found = stage.ball(exported(material, to), softbox(), SIZE, rectangle=LAMP)
     places = [(row, column) for row in range(1, SIZE, 2) for column in range(1, SIZE, 2)]
     pixels = [place for place in places if np.hypot(*np.subtract(place, (SIZE - 1) / 2)) < 0.95 * RADIUS * SIZE / 2]
     expected = np.pad(by_rectangle(material, LAMP, pixels, SIZE), ((0, 0), (0, 1)), constant_values=1)
     return matched(expected, np.array([found[place] for place in pixels]))
 
 
-def missed_by_environment(stage: Stage, material: MaterialLike, to: str, samples: int) -> float:
+def missed_by_environment(stage: Stage, material: str | vt.Stack, to: str, samples: int) -> float:
     """The same under `softbox`, by means of so many samples for each pixel."""
     sky = softbox()
     [expected] = sampled(material, [sky], SIZE, samples, TILT)
-    return matched(expected, stage.ball(vt.export(material, to).text, sky, SIZE, tilt=TILT))
+    return matched(expected, stage.ball(exported(material, to), sky, SIZE, tilt=TILT))
 
 
-def meets_light(stage: Stage, material: MaterialLike, to: str, towards: tuple[float, float, float]) -> None:
+def meets_light(stage: Stage, material: str | vt.Stack, to: str, towards: tuple[float, float, float]) -> None:
     """Fails if pixels of a ball under a light are not values in NumPy, within 5 % in a highlight on a mesh, with texels
     in half precision; a light of intensity 1 has irradiance 1 for a surface that faces it."""
     light = np.array(towards) / np.linalg.norm(towards)
-    found = stage.ball(vt.export(material, to).text, softbox(), SIZE, light=tuple(light))
+    found = stage.ball(exported(material, to), softbox(), SIZE, light=tuple(light))
     expected = by_the_model(material, light, PIXELS, SIZE)
     assert expected.max() > 0.01
     np.testing.assert_allclose([found[row, column, :3] for row, column in PIXELS], expected, rtol=0.05, atol=1e-3)
