@@ -40,10 +40,7 @@ export function readPicture(name, bytes) {
  */
 export function prepare(picture) {
   const { width, height, data } = smaller(picture);
-  const brightness = (x, y) => {
-    const i = 3 * (y * width + (x % width));
-    return data[i] + data[i + 1] + data[i + 2];
-  };
+  const brightness = Float64Array.from({ length: width * height }, (_, i) => data[3 * i] + data[3 * i + 1] + data[3 * i + 2]);
 
   // Weigh the cells between four texels
   const rows = height - 1;
@@ -54,8 +51,8 @@ export function prepare(picture) {
   for (let y = 0; y < rows; y++) {
     const sine = Math.sin((Math.PI * (y + 0.5)) / rows);
     for (let x = 0; x < width; x++) {
-      const above = brightness(x, y) + brightness(x + 1, y);
-      const corners = above + brightness(x, y + 1) + brightness(x + 1, y + 1);
+      const a = y * width + x, b = y * width + ((x + 1) % width);
+      const corners = brightness[a] + brightness[b] + brightness[a + width] + brightness[b + width];
       sums[y] += weights[y * width + x] = (corners + 1e-6) * sine;
     }
     total += sums[y];
@@ -110,17 +107,16 @@ function smaller(picture) {
 function irradiance(data, width, height) {
   const sums = new Float64Array(27);
   const basis = new Float64Array(9);
+  const azimuths = Array.from({ length: width }, (_, x) => (2 * Math.PI * (x + 1)) / width);
+  const [sines, cosines] = [Math.sin, Math.cos].map((f) => Float64Array.from(azimuths, f));
   for (let y = 0; y < height - 1; y++) {
     // Between four texels lies a cell of a band around the axis
     const [above, below] = [y, y + 1].map((row) => (Math.PI * row) / (height - 1));
     const area = (2 * Math.PI * (Math.cos(above) - Math.cos(below))) / width, theta = (above + below) / 2;
+    const sine = Math.sin(theta), cosine = Math.cos(theta);
     for (let x = 0; x < width; x++) {
-      const phi = (2 * Math.PI * (x + 1)) / width;
       const a = 3 * (y * width + x), b = 3 * (y * width + ((x + 1) % width)), row = 3 * width;
-      harmonics(
-        [Math.sin(phi) * Math.sin(theta), Math.cos(theta), -Math.cos(phi) * Math.sin(theta)],
-        basis,
-      );
+      harmonics(sines[x] * sine, cosine, -cosines[x] * sine, basis);
       for (let c = 0; c < 3; c++) {
         const light = (area * (data[a + c] + data[b + c] + data[a + row + c] + data[b + row + c])) / 4;
         for (let k = 0; k < 9; k++) sums[3 * k + c] += light * basis[k];
@@ -136,6 +132,14 @@ function irradiance(data, width, height) {
   );
 }
 
-function harmonics([x, y, z], out) {
-  out.set([1, y, z, x, x * y, y * z, 3 * z * z - 1, x * z, x * x - y * y]);
+function harmonics(x, y, z, out) {
+  out[0] = 1;
+  out[1] = y;
+  out[2] = z;
+  out[3] = x;
+  out[4] = x * y;
+  out[5] = y * z;
+  out[6] = 3 * z * z - 1;
+  out[7] = x * z;
+  out[8] = x * x - y * y;
 }

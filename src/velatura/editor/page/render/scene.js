@@ -143,16 +143,22 @@ function walk(contents, octant, order, skip) {
  */
 function tangents({ positions, uv, triangles }) {
   const found = new Float32Array(triangles.length);
+  const p = [0, 0, 0], q = [0, 0, 0]; // edges
   for (let k = 0; k < triangles.length; k += 3) {
-    const [i, a, b] = triangles.subarray(k, k + 3);
-    const edge = (j) => [0, 1, 2].map((c) => positions[3 * j + c] - positions[3 * i + c]);
-    const [p, q] = [edge(a), edge(b)];
-    const [u0, v0, u1, v1] = [a, b].flatMap((j) => [uv[2 * j] - uv[2 * i], uv[2 * j + 1] - uv[2 * i + 1]]);
+    const i = triangles[k], a = triangles[k + 1], b = triangles[k + 2];
+    for (let c = 0; c < 3; c++) {
+      p[c] = positions[3 * a + c] - positions[3 * i + c];
+      q[c] = positions[3 * b + c] - positions[3 * i + c];
+    }
+    const u0 = uv[2 * a] - uv[2 * i], v0 = uv[2 * a + 1] - uv[2 * i + 1];
+    const u1 = uv[2 * b] - uv[2 * i], v1 = uv[2 * b + 1] - uv[2 * i + 1];
     const determinant = Math.fround(Math.fround(u0 * v1) - Math.fround(v0 * u1));
-    const tangent = determinant
-      ? p.map((_, c) => (v1 * p[c] - v0 * q[c]) / determinant)
-      : perpendicular(normalized(cross(p, q)));
-    found.set(normalized(tangent), k);
+    if (determinant) for (let c = 0; c < 3; c++) p[c] = (v1 * p[c] - v0 * q[c]) / determinant;
+    const [x, y, z] = determinant ? p : perpendicular(normalized(cross(p, q)));
+    const length = Math.hypot(x, y, z) || 1;
+    found[k] = x / length;
+    found[k + 1] = y / length;
+    found[k + 2] = z / length;
   }
   return found;
 }
@@ -173,10 +179,10 @@ function normalized(v) {
 /** Tangents of vertices, for the preview. */
 function averaged({ positions, triangles }, frames) {
   const sums = new Float32Array(positions.length);
-  triangles.forEach((i, corner) => {
-    const at = corner - (corner % 3);
-    for (let c = 0; c < 3; c++) sums[3 * i + c] += frames[at + c];
-  });
+  for (let corner = 0; corner < triangles.length; corner++) {
+    const to = 3 * triangles[corner], from = corner - (corner % 3);
+    for (let c = 0; c < 3; c++) sums[to + c] += frames[from + c];
+  }
   return sums;
 }
 

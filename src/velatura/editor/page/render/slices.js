@@ -209,7 +209,7 @@ const sliced = ({ energy, alpha, rotation }, ...range) => ({
 });
 
 const colours = (pixels) =>
-  Array.from({ length: pixels.length / 4 }, (_, i) => Array.from(pixels.subarray(4 * i, 4 * i + 3)));
+  Array.from({ length: pixels.length / 4 }, (_, i) => [pixels[4 * i], pixels[4 * i + 1], pixels[4 * i + 2]]);
 
 // Code ------------------------------------------------------------------------------------------------
 

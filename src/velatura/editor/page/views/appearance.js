@@ -66,8 +66,9 @@ export function mountAppearance(element, services) {
 
   /** Reads the material anew where it is another one. */
   async function follow() {
-    if (element.checkVisibility()) further.follow();
-    if (!element.checkVisibility() || now() === text) return paint();
+    const isSeen = !element.hidden && element.checkVisibility(); // which lays out the page
+    if (isSeen) further.follow();
+    if (!isSeen || now() === text) return paint();
     text = now();
     [asked, origin, ways, coatLobe, coatSays] = [null, null, null, null, ''];
     const key = text;

@@ -54,13 +54,22 @@ function grouped(groups, known, pages) {
 /** Whether a menu lists a name, or the same substance by one. */
 const nameIn = (listed, name) => listed.includes(name) || listed.includes(name.replace(PALIK, ''));
 
+const pagesOf = (names, opaque) => Object.entries(names.pages).filter(([, page]) => page.opaque === opaque);
+
+/** A function of all names that is worked out once for them. */
+function once(make) {
+  const made = new WeakMap();
+  return (names) => {
+    if (!made.has(names)) made.set(names, make(names));
+    return made.get(names);
+  };
+}
+
 /** The groups of a menu of metals; a name that only stands for one of them is left out. */
-export const metals = (names) => grouped(METALS, names.conductors, pagesOf(names, true));
+export const metals = once((names) => grouped(METALS, names.conductors, pagesOf(names, true)));
 
 /** The same for dielectrics. */
-export const dielectrics = (names) => grouped(DIELECTRICS, names.dielectrics, pagesOf(names, false));
-
-const pagesOf = (names, opaque) => Object.entries(names.pages).filter(([, page]) => page.opaque === opaque);
+export const dielectrics = once((names) => grouped(DIELECTRICS, names.dielectrics, pagesOf(names, false)));
 
 /** The option of a menu for a chosen `name` that none of its groups has, as a list. */
 export function chosen(name, groups) {

@@ -26,7 +26,8 @@ export function createToolbar(services) {
     dialogs,
     library: createLibrary(services),
     targets: null, // of the papers
-    sought: '', // in the titles of what can be opened
+    isOpening: false, // whether the dialog shows what can be opened
+    sought: '', // in the titles of it
     choosing: OPENING, // what is done with what is chosen
     saveAs: () => dialogs.save.value.showModal(),
     saveAgain() {
@@ -86,6 +87,7 @@ const step = (word, icon, act, can, title) =>
 async function openDialog(bar, choosing = OPENING) {
   bar.choosing = choosing;
   bar.sought = '';
+  bar.isOpening = true;
   bar.update();
   bar.dialogs.open.value.showModal();
   await bar.library.read();
@@ -94,9 +96,21 @@ async function openDialog(bar, choosing = OPENING) {
   bar.update();
 }
 
+/** It is empty while it is closed, since the page is written anew with each change of the material. */
 function openPanel(bar) {
+  const dialog = bar.dialogs.open;
+  const closed = () => {
+    bar.isOpening = dialog.value.open; // again, where it was opened at once
+    bar.update();
+  };
+  return html`<dialog class="open" aria-label=${bar.choosing.label} ${ref(dialog)} @close=${closed}>
+    ${bar.isOpening ? openable(bar) : nothing}
+  </dialog>`;
+}
+
+function openable(bar) {
   const close = () => bar.dialogs.open.value.close();
-  const { label, take = bar.files.open } = bar.choosing, opening = bar.choosing === OPENING;
+  const { take = bar.files.open } = bar.choosing, opening = bar.choosing === OPENING;
   const sought = bar.sought.trim().toLowerCase();
   const found = (entries) => entries.filter(({ title, name = '' }) => [title.toLowerCase(), name].some((text) => text.includes(sought)));
   const fromHere = async () => {
@@ -130,8 +144,7 @@ function openPanel(bar) {
     const these = found(entries);
     return these.length || (empty && !sought) ? section(title, these, empty) : nothing;
   };
-  return html`<dialog class="open" aria-label=${label} ${ref(bar.dialogs.open)}>
-    <div class="head">
+  return html`<div class="head">
       <input type="search" aria-label="Search" placeholder="Search" .value=${live(bar.sought)} @input=${({ target }) => seek(target.value)} @keydown=${first} />
       ${
         opening
@@ -143,8 +156,7 @@ function openPanel(bar) {
     </div>
     ${groups.map((name) => some(name, byTitle(presets.filter(({ group }) => group === name))))}
     ${bar.library.view(sought, seek, (file) => close() || bar.files.openFile(file, take))}
-    ${opening ? some('From the papers', targets, html`<p>${bar.lacks('targets') || 'On their way.'}</p>`) : nothing}
-  </dialog>`;
+    ${opening ? some('From the papers', targets, html`<p>${bar.lacks('targets') || 'On their way.'}</p>`) : nothing}`;
 }
 
 const byTitle = (entries) => entries.sort((a, b) => a.title.localeCompare(b.title));
