@@ -32,7 +32,7 @@ Open = Callable[..., Visit]
 SAME = 0.5  # of 255: mean difference of previews of one material
 OTHER = 1.0  # of 255: what a change of the material makes at least
 NOISE = 4.0  # standard errors
-SIZE = (128, 96)  # pixels of the pictures that are traced
+SIZE = (96, 96)  # pixels of the pictures that are traced, which hold the sphere
 SAMPLES = 32
 ROOMY = "localStorage['velatura.layout'] ??= '{}'"  # the panel has all the room
 
@@ -392,7 +392,7 @@ def test_small_pictures_lead_to_members(visit: Open) -> None:
         """() => {
           const { viewport } = velatura;
           const { thumbnail } = viewport;
-          viewport.thumbnail = (shader, values, size) => thumbnail.call(viewport, shader, values, size, 4);
+          viewport.thumbnail = (shader, values, size) => thumbnail.call(viewport, shader, values, size, 1);
           viewport.setSize(96, 72);
           viewport.setBudget({ samples: 1 });
         }"""

@@ -37,7 +37,7 @@ PRESETS = [
     "anodised-titanium",  # which has films
 ]
 FOLLOWED = "Coated rough metal"  # whose values may move; tables of all take longer to write
-LAYERS = 1  # besides the orders of presets; more take longer to write
+LAYERS = 0  # besides the orders of presets, of which more take longer to write
 FIRST_LOAD = 6e6  # bytes, compressed
 POLICY = (  # as a careful host of the folder may send it
     "default-src 'none'; script-src 'self'; style-src 'self'; img-src 'self' data: blob:; connect-src 'self'; "
