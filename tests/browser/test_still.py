@@ -78,8 +78,8 @@ def test_without_a_material_that_loses_light_the_furnace_is_white(stage: viewpor
 
 def test_the_sun_is_as_bright_as_in_mitsuba(stage: viewport.Stage) -> None:
     """Expected: a matte body in the sky has the same mean, shadow of the plinth and sun included, within 2 %."""
-    stage.resize(16, 16)
-    found = viewport.compare(stage, vt.Stack([vt.Diffuse(albedo=0.5)]), "ball", "sky", 512, 1024)
+    stage.resize(12, 12)
+    found = viewport.compare(stage, vt.Stack([vt.Diffuse(albedo=0.5)]), "ball", "sky", 192, 1024)
     page, truth = (picture.mean(axis=(0, 1)) for picture in found.pictures)
     np.testing.assert_allclose(page, truth, rtol=0.02)
 

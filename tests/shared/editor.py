@@ -165,7 +165,8 @@ class Visit:
           quiet, problems, held: viewport.held, previewed: viewport.previewed, samples: viewport.samples,
           focus: document.activeElement?.outerHTML.slice(0, 200), layers: store.get().layers, view: store.get().view,
         })"""
-        return f"{self.page.evaluate(f'({told})(window.velatura)')}\n{self.complaints}"
+        asked = f"window.velatura ? ({told})(velatura) : location.href"
+        return f"{self.page.evaluate(asked)}\n{self.complaints}"
 
     def state(self, path: str = "") -> Any:
         """A part of the state: `state("layers.0.keys.alpha")`."""
