@@ -314,6 +314,7 @@ def test_the_shader_that_is_exported_is_that_of_python(visit: Open) -> None:
     text = here.page.locator("dialog.export textarea").input_value()
     wanted = vt.export(vt.preset("glossy-plastic").replace(layer0_alpha=0.4), "glsl", "belcour2018").text
     number = re.compile(r"(?<![\w.])\d+\.?\d*(?:e-?\d+)?")
+    text, wanted = (re.sub("Velatura.*", "", each) for each in (text, wanted))  # the folder may be of yesterday
     assert number.sub("#", text.partition("\n")[2]) == number.sub("#", wanted.partition("\n")[2])
     found, expected = ([float(x) for x in number.findall(each)] for each in (text, wanted))
     np.testing.assert_allclose(found, expected, rtol=1e-6)
