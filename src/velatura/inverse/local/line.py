@@ -455,9 +455,11 @@ class _Search:
         base = self.base[0]
         gone, far = there.part - base.part, self.aim - base.part
         if self.landing:
-            nearer = there.off < max(self.line.allowed, self.last)
-            self._aimed(now, self.aim if nearer else self.aim - self.lower, there.off if nearer else np.inf)
-            self.lower *= 1 if nearer else 2
+            if there.off < max(self.line.allowed, self.last):
+                self._aimed(now, self.aim, there.off)
+            else:
+                self._aimed(self.base[1], self.aim - self.lower)
+                self.lower *= 2
         elif astray:
             self.step = BACK * gone if SEEN < gone < far else far / 4
             self._stepped()
