@@ -67,6 +67,6 @@ def pytest_runtest_makereport(call: pytest.CallInfo[None]) -> Generator[None, py
     report = yield
     if report.when == "call":
         if report.failed:
-            report.sections += [(f"page {k}", visit.told()) for k, visit in enumerate(Visit.open)]
+            report.sections += [(f"page {k}", visit.report()) for k, visit in enumerate(Visit.open)]
         Visit.open.clear()
     return report

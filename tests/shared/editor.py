@@ -157,16 +157,16 @@ class Visit:
         """Wait until there is a picture: the preview, which is the same every time."""
         self._wait_for("window.velatura?.viewport.slots.a.shader && velatura.viewport.previewed")
 
-    def told(self) -> str:
+    def report(self) -> str:
         """The state of the page, for the report of a failed test."""
         if self.page.is_closed():
             return "closed"
-        told = """({ quiet, problems, viewport, store, session }) => JSON.stringify({
+        report = """({ quiet, problems, viewport, store, session }) => JSON.stringify({
           quiet, problems, held: viewport.held, previewed: viewport.previewed, samples: viewport.samples,
           focus: document.activeElement?.outerHTML.slice(0, 200), layers: store.get().layers, view: store.get().view,
         })"""
-        asked = f"window.velatura ? ({told})(velatura) : location.href"
-        return f"{self.page.evaluate(asked)}\n{self.complaints}"
+        state = self.page.evaluate(f"window.velatura ? ({report})(velatura) : location.href")
+        return f"{state}\n{self.complaints}"
 
     def state(self, path: str = "") -> Any:
         """A part of the state: `state("layers.0.keys.alpha")`."""

@@ -191,10 +191,9 @@ def _by_closed_form(
     other side of that above, which no line leads to."""
     near = nearest(present.quickly, wish)
     further = near.part >= max(LEAST, least + (0 if present.smooth or least < LEAST else BEYOND))
-    fresh = DraggedStack.of(near.stack.stack, wish, present.model, with_pins=True) if further else None
+    fresh = _instead(present, near.stack.stack, wish) if further else None
     if fresh is None:
         return None
-    fresh = dataclasses.replace(fresh, tail=present.tail, name=present.name, diffuse=present.diffuse)
     found, bound, part, _ = _along(fresh, now, wish, True, READINGS[:1])
     if part >= max(LEAST, least) and not quick:
         found, bound, part, _ = _along(found, now, wish, False)
@@ -235,16 +234,21 @@ def _elsewhere(present: DraggedStack, wish: Target, quick: bool) -> DraggedStack
     if present.scatters:
         return None
     found = in_closed_form(wish, present.model.without_tir, EFFORT)
-    fresh = DraggedStack.of(found.stack, wish, present.model, with_pins=True) if found else None
+    fresh = _instead(present, found.stack, wish) if found else None
     if fresh is None:
         return None
-    fresh = dataclasses.replace(fresh, tail=present.tail, name=present.name, diffuse=present.diffuse)
     here, goal = fresh.point.reading.value, _readings(fresh, fresh.now(wish), wish)
     there = _line(fresh, here, goal, wish, quick).last(READINGS, whole=True)
     stack = dataclasses.replace(fresh, point=there.point).renamed(wish)
     if there.bound is None:
         return stack
     return None if there.off > CLOSE else _met(stack, wish)
+
+
+def _instead(present: DraggedStack, stack: Stack, wish: Target) -> DraggedStack | None:
+    """A stack that is found in place of the interfaces of the present one, above what lies below these."""
+    fresh = DraggedStack.of(stack, wish, present.model, with_pins=True)
+    return fresh and dataclasses.replace(fresh, tail=present.tail, name=present.name, diffuse=present.diffuse)
 
 
 def lobes_of(stack: Stack, dragged: DraggedStack) -> Target:

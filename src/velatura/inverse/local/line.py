@@ -36,10 +36,8 @@ FURTHER_ON, ONWARDS, SHORT = 2.0, 0.02, 2e-3  # steps along the line: by an easy
 LANDING, LOWER = 4, 0.01  # readings that lead back to the line, and by how much less is aimed at first if they do not
 FOLDED = 1 - 1e-3  # the largest variance, folded, that a correction leads to
 DIGITS = 7  # of readings of a slow model
-BENT, ROUNDED = (
-    0.5,
-    10**-DIGITS,
-)  # by how much corrections are off their slopes: share of the square of a distance, least
+BENT = 0.5  # by how much corrections are off their slopes, as a share of the square of a distance
+ROUNDED = 10**-DIGITS  # the same, at least
 BESIDE = 10.0  # part of the way that it is worth to be as much nearer to the line
 
 
