@@ -9,7 +9,6 @@ replaced by its mean. And a metal as bright as can be that is to be blurred more
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -137,12 +136,12 @@ def _colour_lost(present: DraggedStack, wish: Target, possible: Target) -> str |
 
 
 def _along(
-    start: DraggedStack, now: Target, wish: Target, quick: bool, readings: Sequence[int] = READINGS
+    start: DraggedStack, now: Target, wish: Target, quick: bool
 ) -> tuple[DraggedStack, Bound | None, float, bool]:
     """The last stack on the line to a wish, the bound there, the part of the way, and whether the search ended."""
     here, goal = _readings(start, now, now), _readings(start, now, wish)
     line = _line(start, here, goal, wish, quick)
-    found = line.last(readings)
+    found = line.last(READINGS)
     if found.off >= line.allowed or found.part >= 1 + line.allowed:
         found = Reached(start.point, 0.0, 0.0, found.bound, settled=False)
     stack = dataclasses.replace(start, point=found.point).renamed(wish)
@@ -194,20 +193,18 @@ def _by_closed_form(
     fresh = _instead(present, near.stack.stack, wish) if further else None
     if fresh is None:
         return None
-    found, bound, part, _ = _along(fresh, now, wish, True, READINGS[:1])
-    if part >= max(LEAST, least) and not quick:
-        found, bound, part, _ = _along(found, now, wish, False)
+    found, bound, part, _ = _along(fresh, now, wish, quick)
     return (found, bound, part) if part >= max(LEAST, least) else None
 
 
 def _readings(start: DraggedStack, now: Target, wish: Target) -> np.ndarray:
-    """Readings of a wish; of lobes whose blur stays, each interface keeps its own."""
+    """Readings of a wish; interfaces of a lobe whose blur stays differ from one another as they do."""
     goal = start.space.goal(wish)
     own = goal[3 * start.space.lobes :].reshape(len(start.interfaces), -1)
-    for n, interface in enumerate(start.interfaces):
-        blur, asked = (np.array(target.lobes[interface.lobe].axes) for target in (now, wish))
-        if np.abs(blur - asked).max() < SAME:
-            own[n] = start.variances[n]
+    for k, (before, lobe) in enumerate(zip(now.lobes, wish.lobes)):
+        if np.abs(np.subtract(before.axes, lobe.axes)).max() < SAME:
+            these = [n for n, interface in enumerate(start.interfaces) if interface.lobe == k]
+            own[these] += start.variances[these] - start.variances[these].mean(axis=0)
     return goal
 
 

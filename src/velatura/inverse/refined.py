@@ -43,7 +43,7 @@ TRIES, OWN, FEWER = 6, 4, 4  # stacks that are begun with; those that have the l
 PARTS = (1.0, 0.5, 0.25)  # of a correction, where all of it has no stack
 FOLLOWED, EXACT = 12, 2e-7  # readings of a search that follows the closed form, and by which these may miss
 LIKELY = 3  # stacks that it begins with
-MAPPED = 4  # requests, each corrected by what the model misses of the last one's stack
+MAPPED, CLOSE = 4, 0.1  # requests, each corrected by what the model misses of the last one's stack, unless that is less
 SAME = 0.03  # logarithm by which models differ about the energy of an index
 MISSED = 1e-4  # energy or variance that is mentioned
 COLOURED = 1e-5  # energy by which the colour of a lobe that films make may be missed
@@ -118,6 +118,8 @@ def _corrected(found: Solution, target: Target, model: Model) -> Iterator[Soluti
     request = goal = numbers(target)
     for _ in range(MAPPED):
         missing = goal - numbers(seen(found.stack, target, model))
+        if request is not goal and np.abs(missing).max() < CLOSE:
+            break
         tried = (request + share * missing for share in PARTS)
         answers = ((other, each) for each in tried if (other := ask(each)))
         nearer = next(answers, None)

@@ -92,12 +92,13 @@ class Line:
             search.go(most)
             if search.settled or whole or (n and search.best[0].part < before + ONWARDS):
                 break
-        if self.enough < QUICK and (search.settled or not whole):
+        settled = search.settled
+        if self.enough < QUICK and (settled or not whole):
             search.refine(self, readings[0])
         _, best = search.best
         best = dataclasses.replace(best, value=best.exact)
         found = self._bounded(self._reached(best.x, best.value), _Correction.fitted(space, search.read, best))
-        return dataclasses.replace(found, settled=search.settled)
+        return dataclasses.replace(found, settled=settled)
 
     def _aimed(self, part: float) -> Line:
         """The line as far as a part of the way."""
@@ -409,13 +410,22 @@ class _Search:
 
     def refine(self, line: Line, readings: int) -> None:
         """Read at most so many points more, until they miss no more than the line allows."""
-        best, self.line = self.best, line
-        if not self.settled or self.seen[-1][0].off > QUICKLY_ON_LINE:
-            self.base, self.landing, self.lower = best, True, LOWER
-            self._aimed(self.base[1], self.base[0].part, self.base[0].off)
+        best, missed, self.line = self.best, self.line.enough, line
+        if self.settled and self.seen[-1][0].off <= QUICKLY_ON_LINE:
+            self._aimed(self.seen[-1][1], self.aim, missed)
+        else:
+            self._landed(best)
         for _ in range(readings):
             if self._ends():
                 return
+            if not self.landing and self.last == np.inf:
+                # This leads elsewhere
+                self._landed(best)
+
+    def _landed(self, at: tuple[Reached, _Read]) -> None:
+        """Go back to the line from a point near it."""
+        self.base, self.landing, self.lower = at, True, LOWER
+        self._aimed(at[1], at[0].part, at[0].off)
 
     def _aimed(self, at: _Read, part: float, last: float = np.inf) -> None:
         """Go on from a point that is read, to a part of the way."""
@@ -436,7 +446,7 @@ class _Search:
         astray = missed > (ASTRAY if self.last == np.inf else max(FOLLOWED, SLOWLY * self.last))
         self.settled = max(missed, nearly) < enough and (self.aim == 1 or abs(hoped - self.aim) > enough)
         if self.settled and there.off > self.line.allowed:
-            if not self.stuck:
+            if not (self.stuck or self.whole):
                 self.stuck, self.read = True, [now]
                 self._aimed(now, self.aim)
                 return False
