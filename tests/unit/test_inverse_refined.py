@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from dataclasses import replace
+from itertools import combinations
 from typing import Any
 
 import numpy as np
@@ -16,9 +17,11 @@ from velatura.figures.bati2021_targets import FIGURES
 from velatura.inverse import Infeasible, Target, alternatives, invert, invert_stack
 from velatura.inverse.lobes.partial_stack import read_whole
 from velatura.inverse.local import coordinates, surrogate
+from velatura.inverse.local.coordinates import Space
 from velatura.inverse.local.dragged import DraggedStack, seen
 from velatura.inverse.local.newton import Nearest, Problem
 from velatura.inverse.reasons import REASONS
+from velatura.inverse.refined import EXACT
 from velatura.model import named
 from velatura.stack import Interface, Medium, Stack
 
@@ -51,6 +54,27 @@ def missed(target: Target, stack: Stack) -> float:
         apart = np.sort(np.reshape(found.alpha[own], (-1, 2))) - np.sort(lobe.axes[:2])
         worst = max(worst, float(np.abs(apart).max()))
     return worst
+
+
+@pytest.mark.parametrize("alphas", [(0.0685, 0.21), (0.2, 0.3, 0.41)])
+def test_every_reading_of_a_search_is_of_another_stack(
+    alphas: tuple[float, ...], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Expected: coordinates that differ by more than an exact answer may miss its lobes by."""
+    *coats, metal = alphas
+    lobes: list[dict[str, Any]] = [{"energy": 0.025, "alpha": alpha} for alpha in coats]
+    target = Target([*lobes, {"energy": 0.3, "alpha": metal, "base": "conductor"}])
+    read, points = Space.read, []
+
+    def noted(space: Space, x: Any) -> Any:
+        if space.slow:
+            points.append(x[:, 0])
+        return read(space, x)
+
+    monkeypatch.setattr(Space, "read", noted)
+    assert missed(target, invert_stack(target, MODEL).stack) < 1e-6
+    assert len(points) > 3
+    assert min(np.linalg.norm(a - b) for a, b in combinations(points, 2)) > EXACT
 
 
 @pytest.mark.parametrize("name", ["10 c", "15 c", "17 blue over red", "19 b", "22 bottom"])

@@ -96,7 +96,7 @@ class Line:
         if self.enough < QUICK and (settled or not whole):
             search.refine(self, readings[0])
         _, best = search.best
-        best = dataclasses.replace(best, value=best.exact)
+        best = best.unrounded
         found = self._bounded(self._reached(best.x, best.value), _Correction.fitted(space, search.read, best))
         return dataclasses.replace(found, settled=settled)
 
@@ -284,6 +284,10 @@ class _Read:
     exact: Array
     near: Array
 
+    @property
+    def unrounded(self) -> _Read:
+        return dataclasses.replace(self, value=self.exact)
+
 
 @dataclass(frozen=True)
 class _Correction:
@@ -410,6 +414,7 @@ class _Search:
 
     def refine(self, line: Line, readings: int) -> None:
         """Read at most so many points more, until they miss no more than the line allows."""
+        self.read, self.seen = [each.unrounded for each in self.read], [(at, each.unrounded) for at, each in self.seen]
         best, missed, self.line = self.best, self.line.enough, line
         if self.settled and self.seen[-1][0].off <= QUICKLY_ON_LINE:
             self._aimed(self.seen[-1][1], self.aim, missed)
