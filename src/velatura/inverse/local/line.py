@@ -25,7 +25,7 @@ BLURRED = 0.05  # change of a variance in one step, at least
 KEPT = 0.1  # units of coordinates that are kept, as long as others do as well
 EXACT, QUICK = 1e-6, 2e-3  # by which readings of a slow model may miss their place, at rest and under the hand
 MET = 1e-9  # the same of a model in closed form
-ON_LINE, QUICKLY_ON_LINE = 1e-3, 5e-3  # what an answer may miss the line by, at rest and under the hand
+ON_LINE, QUICKLY_ON_LINE = QUICK, 5e-3  # what an answer may miss the line by, at rest and under the hand
 CHANGED = 1e-4  # by which a wish changes a reading at least, in those units
 DARK, FAINT, SMALL = 1e-3, 1e-4, 0.01  # energies, and variance that is added, for units of readings
 NEARLY, INNER, COARSE = 0.1, 5e-3, 1e-3  # of that, and of the last miss, what the model that is followed may miss
@@ -35,7 +35,7 @@ SEEN, BACK = 0.03, 0.7  # of the way that is gone astray: the least that counts,
 FURTHER_ON, ONWARDS, SHORT = 2.0, 0.02, 2e-3  # steps along the line: by an easy last one, anew, and the least
 LANDING, LOWER = 4, 0.01  # readings that lead back to the line, and by how much less is aimed at first if they do not
 FOLDED = 1 - 1e-3  # the largest variance, folded, that a correction leads to
-DIGITS = 7  # of readings of a slow model
+DIGITS, KNOWN = 7, 9  # of readings of a slow model, and of all else that the search goes on with
 BENT = 0.5  # by how much corrections are off their slopes, as a share of the square of a distance
 ROUNDED = 10**-DIGITS  # the same, at least
 BESIDE = 10.0  # part of the way that it is worth to be as much nearer to the line
@@ -93,8 +93,10 @@ class Line:
             if search.settled or whole or (n and search.best[0].part < before + ONWARDS):
                 break
         settled = search.settled
-        if self.enough < QUICK and (settled or not whole):
-            search.refine(self, readings[0])
+        if settled or not whole:
+            search.refine(search.line, readings[0])
+            if self.enough < QUICK:
+                search.refine(self, readings[0])
         _, best = search.best
         best = best.unrounded
         found = self._bounded(self._reached(best.x, best.value), _Correction.fitted(space, search.read, best))
@@ -414,10 +416,16 @@ class _Search:
 
     def refine(self, line: Line, readings: int) -> None:
         """Read at most so many points more, until they miss no more than the line allows."""
-        self.read, self.seen = [each.unrounded for each in self.read], [(at, each.unrounded) for at, each in self.seen]
-        best, missed, self.line = self.best, self.line.enough, line
-        if self.settled and self.seen[-1][0].off <= QUICKLY_ON_LINE:
-            self._aimed(self.seen[-1][1], self.aim, missed)
+        exact, missed, self.line = line.enough < QUICK, self.line.enough, line
+        if exact:
+            self.read = [each.unrounded for each in self.read]
+            self.seen = [(at, each.unrounded) for at, each in self.seen]
+        best, there = self.best, self.seen[-1]
+        on_line = self.settled and there[0].off <= QUICKLY_ON_LINE
+        if not exact and (on_line or best[0].off < line.enough):
+            return
+        if on_line:
+            self._aimed(there[1], self.aim, missed)
         else:
             self._landed(best)
         for _ in range(readings):
@@ -442,6 +450,7 @@ class _Search:
         line, enough = self.line, self.line.enough
         nearly = min(max(INNER * self.last, NEARLY * enough), COARSE)
         x, near = line._aimed(self.aim)._followed(line.start.space.quickly, self.correction.x, self.correction, nearly)
+        x, near = rounded(x, KNOWN), rounded(near, KNOWN)
         exact, expected = line.start.space.read(x[:, None])[:, 0], self.correction.value_of(x, near)
         value = exact if enough < QUICK else rounded(exact, DIGITS)
         now, missed, hoped = _Read(x, value, exact, near), line._apart(value, expected), line.placed(expected)[0]
