@@ -30,8 +30,8 @@ from velatura.inverse import (
     plots,
 )
 from velatura.inverse.explain import why_not
-from velatura.inverse.lobes import pair, sampling
-from velatura.inverse.solution import in_closed_form
+from velatura.inverse.lobes import pair, sampling, stacks
+from velatura.inverse.solution import EFFORTS, in_closed_form
 from velatura.model import MODELS, Model, named
 from velatura.model.variance import Isotropic, Roughness
 from velatura.optics import fresnel
@@ -822,3 +822,29 @@ def test_stacks_above_lobes_of_three_interfaces_keep_their_indices(below: list[d
     paths, origin, _ = sampling._along(target, named("bati2021"), {0: asked})
     assert len(origin) > 10
     np.testing.assert_array_equal(np.broadcast_to(paths.layers[0].eta, (1, len(origin)))[0], asked[origin])
+
+
+@pytest.mark.parametrize(
+    ("deepest", "lobes"),
+    [
+        ("a lobe too sharp", [(0.02, 0.3, "dielectric"), (0.02, 0.0, "dielectric")]),
+        ("a lobe too dark", [(0.04, 0.4, "dielectric"), (0.04, 0.5, "dielectric"), (0.02, 0.0, "conductor")]),
+    ],
+)
+def test_searches_try_no_more_stacks_of_three_interfaces_a_lobe_than_of_two(
+    deepest: str, lobes: list[tuple[float, float, str]], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Of lobes below one another, where all efforts find none. Expected: at no interface are there more partial stacks
+    than the largest effort keeps, each with every index."""
+    sizes = list[int]()
+
+    def counted(step: Callable[..., Any]) -> Callable[..., Any]:
+        return lambda paths, *rest: (sizes.append(len(paths.cost)), step(paths, *rest))[1]
+
+    for name in ("with_upper", "with_last"):
+        monkeypatch.setattr(stacks, name, counted(getattr(stacks, name)))
+    keys = ("energy", "alpha", "base")
+    target = Target([{**dict(zip(keys, lobe)), "interfaces": 1 if lobe[2] == "conductor" else 3} for lobe in lobes])
+    assert in_closed_form(target, named("velatura").surrogate) is None
+    spread, keep = EFFORTS[-1]
+    assert max(sizes) <= keep * (spread + 1)

@@ -15,7 +15,7 @@ from numpy.typing import ArrayLike
 
 from velatura import ops
 from velatura.inverse.lobes import coatings
-from velatura.inverse.lobes.partial_stack import Above, Array, Batch, Layers, Mask
+from velatura.inverse.lobes.partial_stack import Above, Array, Batch, Layers, Mask, take
 from velatura.inverse.lobes.roots import false_position, first_crossing, nearest_to_zero
 from velatura.inverse.lobes.target import BLUR
 from velatura.model import Model, named
@@ -222,7 +222,7 @@ def _closed_form(
         above = above.through(choice.tau)
     r = attenuated(above, energy)
     s_r = reflected(above, variance, r, bright)
-    roughness = floor(s_r).roughness(above.f)
+    roughness, blur = floor(s_r).roughness(above.f), margin(least(s_r))
 
     # Find its index, and what absorption must take away (Bati et al. 2021, Algorithm 4)
     if choice.kind == "mirror":
@@ -230,8 +230,11 @@ def _closed_form(
     elif choice.kind == "conductor":
         layers = _conductor(above, r, roughness, choice)
     else:
-        layers = dielectric(above, r, roughness, choice, nothing=np.all(energy <= ENERGY_MIN, axis=0))
-    margins = {"blur": margin(least(s_r)), **layers.margins}
+        nothing = np.all(energy <= ENERGY_MIN, axis=0)
+        # Where nothing may absorb, the index also shows whether the colour is in the way
+        hopeless = (blur < 0) & bool(choice.absorbs and choice.tau is None)
+        layers = dielectric(above, r, roughness, choice, nothing, hopeless)
+    margins = {"blur": blur, **layers.margins}
     reflectance = above.reflectance(layers)
     tau: Value = optical_depth(reflectance, r)
     # With films dark channels are missed by shares of the bright ones
@@ -284,42 +287,61 @@ def reflected(above: Above, variance: Variance, r: Array, bright: Array) -> Vari
     return ((variance + up * -1.0) * (1 / j) + down * -1.0 + inner * (-1.0 * m)) * (1 / (1 + m))
 
 
-def dielectric(above: Above, r: Array, roughness: Roughness, choice: Choice, nothing: Mask | bool = False) -> Layers:
+def dielectric(
+    above: Above,
+    r: Array,
+    roughness: Roughness,
+    choice: Choice,
+    nothing: Mask | bool = False,
+    hopeless: Mask | bool = False,
+) -> Layers:
     """The dielectric that reflects r in the channel that needs most, and no less in the others.
 
-    nothing: where none is to reflect; tables hold so little that no index is found by what they have.
+    nothing: where none is to reflect; tables hold so little that no index is found by what they have. hopeless: where
+    another constraint is broken anyway, so that any index will do that reflects enough.
     """
-
-    def layers(eta: Value) -> Layers:
-        return Layers("dielectric", eta, None, roughness, 0.0, films=choice.films)
-
     if choice.eta is not None:
-        return layers(as_index(choice.eta)).with_margins(index=within(choice.eta, choice.eta_max))
+        layers = Layers("dielectric", as_index(choice.eta), None, roughness, 0.0, films=choice.films)
+        return layers.with_margins(index=within(choice.eta, choice.eta_max))
     if choice.films:
         return _coated_dielectric(above, r, roughness, choice)
 
     denser = np.broadcast_to(np.asarray(choice.side) > 0, np.broadcast_shapes(np.shape(choice.side), r.shape[1:]))
-
-    def index(u: Array) -> Array:
-        """Index of a smooth dielectric of reflectance u at normal incidence (Bati et al. 2021, Eq. 7)."""
-        root = np.sqrt(np.maximum(u, 0.0))  # of what rounding makes less than nothing
-        ratio = (1 + root) / (1 - root)
-        return above.eta * np.where(denser, ratio, 1 / ratio)[None]
-
-    def excess(log_u: Array) -> Array:
-        # Both as logarithms, in which it is almost straight where next to nothing is reflected, too
-        reflectance = above.reflectance(layers(index(np.exp(log_u) - FAINT)))
-        return np.min(np.log((reflectance + FAINT) / (r + FAINT)), axis=0)
-
+    each = _Dielectrics(above, r, roughness, denser)
     ratio = np.mean(np.atleast_2d(np.where(denser, choice.eta_max, 1.0) / above.eta), axis=0)
     exists = np.where(denser, ratio >= 1, ratio <= 1)
     u_max = np.where(exists, ((ratio - 1) / (ratio + 1)) ** 2, 0.0)
     low, high = np.full_like(u_max, np.log(FAINT)), np.log(u_max + FAINT)
-    most = np.where(u_max > 0, excess(high), -1.0)
+    most = np.where(u_max > 0, each.excess(high), -1.0)
     least = np.where(nothing, 0.0, np.min(np.log(FAINT / (r + FAINT)), axis=0)) + 0.0 * u_max
-    u = np.exp(false_position(excess, low, high, least, most)) - FAINT
-    solved = np.where(most < 0, u_max, u)
-    return layers(index(solved)).with_margins(energy=margin(np.where(exists, most, -1.0), NEGLIGIBLE))
+    u, some = u_max.copy(), np.flatnonzero((most >= 0) & ~np.broadcast_to(hopeless, most.shape))
+    if len(some):
+        part, *ends = take((each, low, high, least, most), some, len(u))
+        u[some] = np.exp(false_position(part.excess, *ends)) - FAINT
+    return each.layers(u).with_margins(energy=margin(np.where(exists, most, -1.0), NEGLIGIBLE))
+
+
+@dataclass(frozen=True)
+class _Dielectrics(Batch):
+    """The dielectrics below N stacks on one side each, by their reflectance u (N,) when smooth; r: what is asked."""
+
+    above: Above
+    r: Array
+    roughness: Roughness
+    denser: Mask
+
+    def layers(self, u: Array) -> Layers:
+        """The dielectrics, at normal incidence of reflectance u when smooth (Bati et al. 2021, Eq. 7)."""
+        root = np.sqrt(np.maximum(u, 0.0))  # of what rounding makes less than nothing
+        ratio = (1 + root) / (1 - root)
+        eta = self.above.eta * np.where(self.denser, ratio, 1 / ratio)[None]
+        return Layers("dielectric", eta, None, self.roughness, 0.0)
+
+    def excess(self, log_u: Array) -> Array:
+        """What they reflect beyond r, in the channel that needs most, by the logarithm of u + FAINT."""
+        # Both as logarithms, in which it is almost straight where next to nothing is reflected, too
+        reflectance = self.above.reflectance(self.layers(np.exp(log_u) - FAINT))
+        return np.asarray(np.min(np.log((reflectance + FAINT) / (self.r + FAINT)), axis=0))
 
 
 def _coated_dielectric(above: Above, r: Array, roughness: Roughness, choice: Choice) -> Layers:

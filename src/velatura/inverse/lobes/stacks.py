@@ -24,7 +24,7 @@ from velatura.model import Model
 from velatura.model.variance import Variance
 from velatura.ops import Value
 
-TRIED = 4096  # stacks with two interfaces of a lobe of three that are followed
+TRIED = 8192  # stacks with two interfaces of a lobe of three, of all that there are
 ALPHA_APART, ENOUGH = 1e-4, 1e-6  # by which a roughness may miss the one that is fixed, and may where that is sought
 
 
@@ -113,13 +113,15 @@ def extended(
         index = np.r_[np.repeat(np.arange(count), len(tried)), np.arange(count)][: len(eta)]
         if pinned is None and lobe.interfaces == 2 and lobe.fixed.of("alpha", 1) is not None:
             index, eta = _of_fixed_roughness(paths, lobe, _variance(paths, lobe), choice, tried)
+        if len(index) > TRIED and n:  # below each stack all indices of two interfaces would be too many
+            some = np.sort(np.random.default_rng(0).choice(len(index), TRIED, replace=False))
+            index, eta = index[some], eta[some]
         left = take(energy, index, count)
         paths, energy = with_upper(paths.take(index), lobe, n, left, target, eta[None], pinned_above(lobe, n))
         above = above[index]
         possible = np.broadcast_to(paths.layers[-1].feasible, paths.cost.shape)
         if possible.any():  # what the others leave takes long to solve for
             kept = np.flatnonzero(possible)
-            kept = kept[np.linspace(0, len(kept) - 1, min(len(kept), TRIED)).astype(int)] if n else kept
             paths, energy, above = paths.take(kept), take(energy, kept, len(possible)), above[kept]
 
     # Take either index of the interface that gives what is left
