@@ -19,7 +19,7 @@ from velatura.inverse.lobes.partial_stack import read_whole
 from velatura.inverse.local import coordinates, surrogate
 from velatura.inverse.local.coordinates import Space
 from velatura.inverse.local.dragged import DraggedStack, seen
-from velatura.inverse.local.newton import Nearest, Problem
+from velatura.inverse.local.newton import SLOW_ROUNDS, Nearest, Problem
 from velatura.inverse.reasons import REASONS
 from velatura.inverse.refined import EXACT
 from velatura.model import named
@@ -89,6 +89,23 @@ def test_targets_of_the_figures_are_met_by_few_calls(name: str, monkeypatch: pyt
     target = Target(FIGURES[name])
     assert missed(target, invert_stack(target, MODEL).stack) < 1e-6
     assert len(calls) <= (10 if name != "17 blue over red" else 40)  # of which the first stack does not lead to one
+
+
+def test_a_search_ends_with_the_first_stack_that_stays_far_from_a_wish_without_any(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """A sharp lobe below one of three interfaces that blurs. Expected: the readings of one search by Broyden's method
+    at most."""
+    calls = []
+
+    def read(*args: Any) -> Any:
+        calls.append(args)
+        return read_whole(*args)
+
+    monkeypatch.setattr(coordinates, "read_whole", read)
+    lobes = [{"energy": 0.1, "alpha": 0.4, "interfaces": 3}, {"energy": 0.03, "alpha": 0.1}]
+    assert invert.search(Target(lobes), MODEL) is None
+    assert 0 < len(calls) <= SLOW_ROUNDS
 
 
 def test_alternatives_share_the_lobes_that_the_model_itself_reads() -> None:

@@ -40,6 +40,7 @@ READINGS = 60  # to find ways out, as interfaces that are read
 LEAST_READINGS, MOST_READINGS = 5, 8  # of stacks, for one way
 SAID = 1e-4  # changes of quantities that are mentioned, as logarithms
 TRIES, OWN, FEWER = 6, 4, 4  # stacks that are begun with; those that have the lobes of one target; where none has
+HOPELESS = 0.5  # share of what is asked that the first of these misses, where none has and no other one follows
 PARTS = (1.0, 0.5, 0.25)  # of a correction, where all of it has no stack
 FOLLOWED, EXACT = 12, 2e-7  # readings of a search that follows the closed form, and by which these may miss
 LIKELY = 3  # stacks that it begins with
@@ -64,7 +65,9 @@ def search(target: Target, model: Model) -> Solution | None:
             if (followed := _followed(found, target, model)) is not None:
                 return followed
             likely.append(found)
-        tried = itertools.islice(itertools.chain(likely, others), TRIES)
+        # Readings of lobes of three interfaces take longest, and no stack but the likely ones has led to one
+        triple = any(lobe.interfaces > 2 for lobe in target.lobes)
+        tried = itertools.islice(itertools.chain(likely, others), LIKELY if triple else TRIES)
     else:
         tried = itertools.islice(_approaching(target, model.surrogate), FEWER)
     nearest, least = None, np.inf
@@ -74,6 +77,8 @@ def search(target: Target, model: Model) -> Solution | None:
             return met
         if met.missing < least:
             nearest, least = found, met.missing
+        if own is None and target.kind is Isotropic and HOPELESS < met.missing < np.inf:
+            break
     last = moved(nearest, target, model, giving=False, effort=2) if nearest and target.kind is not Isotropic else None
     return last if isinstance(last, Solution) else None
 
