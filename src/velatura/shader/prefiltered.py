@@ -34,7 +34,7 @@ Array = NDArray[np.floating]
 
 LINE, PLANE = (64,), (32, 17)  # nodes over the cosine, and the azimuth where an interface is brushed
 COS_MIN, COS_MAX = 0.02, 1 - 1e-6  # of directions at nodes, which all have an azimuth
-SAMPLES = 1024  # of a part at a node, of which a plane's blurs are fitted to a quarter
+SAMPLES = 1024  # of a part at a node, and a quarter where there is a plane of them
 FAINT = 1e-4  # energy, below which a part is left out
 MOST = 3  # blurs, but one at least for each part
 NEAR = 0.005  # distance times energy and alpha, from which a part gets no further blur
@@ -70,12 +70,13 @@ def prefiltered(material: Material, model: Model) -> Prefiltered:
     body = model.body(material, variance_kind(material), Context())
     count = len(model.statistics(material, (x[:1], y[:1], z[:1])).energy)
     sides = [(x, y, side * z) for side in ([1.0, -1.0] if material.transmits else [1.0])]
-    seen = [(body.at_direction(_repeated(wi)), wi) for wi in sides]
+    samples = SAMPLES if isotropic else SAMPLES // 4
+    seen = [(body.at_direction(_repeated(wi, samples)), wi) for wi in sides]
 
     def of(lobes: frozenset[int]) -> _Light:
         reflected = Query([k in lobes for k in range(count + 1)], False)
         asked = reflected if lobes else Query(False, True, radiance=False)
-        return _Light(lobes, [_Part.of(body, wi, phi, asked) for body, wi in seen])
+        return _Light(lobes, [_Part.of(body, wi, phi, samples, asked) for body, wi in seen])
 
     reflected = [of(frozenset([k])) for k in range(count + 1)]
     passed = [of(frozenset())] if material.transmits else []
@@ -85,9 +86,9 @@ def prefiltered(material: Material, model: Model) -> Prefiltered:
     return Prefiltered(energy, _shared(kept), shape, [not each.lobes for each in kept], turn)
 
 
-def _repeated(wi: Direction) -> Direction:
+def _repeated(wi: Direction, samples: int) -> Direction:
     """Directions at nodes, each as often as there are samples."""
-    x, y, z = (repeated(each, SAMPLES) for each in wi)
+    x, y, z = (repeated(each, samples) for each in wi)
     return x, y, z
 
 
@@ -183,51 +184,43 @@ class _Part:
     density: Array
 
     @classmethod
-    def of(cls, body: Body, wi: Direction, phi: Array, asked: Query) -> _Part:
+    def of(cls, body: Body, wi: Direction, phi: Array, samples: int, asked: Query) -> _Part:
         nodes = len(wi[0])
-        repeat = _repeated(wi)
-        wo, _ = body.sample(repeat, *at_nodes(nodes, SAMPLES), asked)
+        repeat = _repeated(wi, samples)
+        wo, _ = body.sample(repeat, *at_nodes(nodes, samples), asked)
         value, density = body.eval_pdf(repeat, wo, asked)
         weight = np.where(density > 0, value / np.where(density > 0, density, 1), 0)
-        weight = np.broadcast_to(weight, (3, nodes * SAMPLES)).reshape(3, nodes, SAMPLES)
-        w = np.array(np.broadcast_arrays(*wo)).reshape(3, nodes, SAMPLES)
+        weight = np.broadcast_to(weight, (3, nodes * samples)).reshape(3, nodes, samples)
+        w = np.array(np.broadcast_arrays(*wo)).reshape(3, nodes, samples)
         ratio = weight.mean(axis=0)
         ratio = ratio / np.maximum(ratio.mean(axis=-1, keepdims=True), 1e-12)
         sine = np.hypot(wi[0], wi[1])
         c, s = (wi[0] / sine)[:, None], (wi[1] / sine)[:, None]
         up = np.sign(wi[2])[:, None] * (-1 if asked.transmission else 1) * w[2]
         w = np.stack([c * w[0] + s * w[1], c * w[1] - s * w[0], np.abs(up)])
-        density = np.where(up > 0, np.broadcast_to(density, nodes * SAMPLES).reshape(nodes, SAMPLES), 0)
+        density = np.where(up > 0, np.broadcast_to(density, nodes * samples).reshape(nodes, samples), 0)
         return cls(weight.mean(axis=-1).T, sine, phi, w, ratio, density)
 
     def blurs(self, count: int) -> Array:
         """So many blurs (nodes, count, 4)."""
-        w, ratio, density = self._few
         start, kept = self._start(count), set[int]()
         if self._isotropic:
             start[..., 1], kept = 0, {1}  # in the plane of incidence
-        found = blurs.fitted(start, self.sine, w, ratio, density, kept)
+        found = blurs.fitted(start, self.sine, self.w, self.ratio, self.density, kept)
         if count > 1:
             # Each of one alpha from all directions, so that neighbours read the same level of a texture
             weight = self.energy.max(axis=-1)[:, None] * found[..., 3]
             found[..., 2] = (weight * found[..., 2]).sum(axis=0) / np.maximum(weight.sum(axis=0), 1e-12)
-            found = blurs.fitted(found, self.sine, w, ratio, density, kept | {2})
+            found = blurs.fitted(found, self.sine, self.w, self.ratio, self.density, kept | {2})
         return found
 
     def distances(self, found: Array) -> Array:
         """Distances of blurs (nodes, K, 4) times energies, at nodes."""
-        w, ratio, density = self._few
-        return blurs.distance(found, self.sine, w, ratio, density) * self.energy.max(axis=-1)
+        return blurs.distance(found, self.sine, self.w, self.ratio, self.density) * self.energy.max(axis=-1)
 
     @property
     def _isotropic(self) -> bool:
         return len(self.sine) == LINE[0]
-
-    @property
-    def _few(self) -> tuple[Array, Array, Array]:
-        """The directions, ratios and densities that blurs are fitted to."""
-        few = slice(None, None, 1 if self._isotropic else 4)
-        return self.w[..., few], self.ratio[:, few], self.density[:, few]
 
     def _start(self, count: int) -> Array:
         """Blurs side by side along the longer axis, the narrower ones first."""
