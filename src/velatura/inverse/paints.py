@@ -49,6 +49,7 @@ READING = 1e-3  # standard error of a reading, of which intervals are reported
 HIDDEN = 3.0  # depth of a film of which nothing shows through, in lengths of diffusion
 RANGE = 1e-5, 1e5  # of K and S times the depth of a film
 STEP = 1e-3  # of logarithms, and relative to concentrations, for derivatives
+TRIED = 25  # mixtures of a search, beside those of slopes: further ones lie along a valley of like mixtures
 MEASURED = "wavelength_nm", "black", "white"  # columns of a file
 VISIBLE_NM = 380.0, 730.0  # of which colours are made
 PULL = 1e-3  # towards the first guess, in units of colour difference: decides what the wish leaves open
@@ -427,7 +428,7 @@ def paint(
     for start in (seen.guess(most, total), np.clip(written, 0, most)):
         first = np.clip(start, 1e-3 * most, (1 - 1e-3) * most)
         options: dict[str, Any] = {"bounds": (0, most), "diff_step": STEP, "x_scale": most, "xtol": 1e-6, "ftol": 1e-6}
-        tried.append(optimize.least_squares(residual, first, args=(first,), **options))
+        tried.append(optimize.least_squares(residual, first, args=(first,), max_nfev=TRIED, **options))
         if tried[-1].cost < SAME:
             break
     shares = min(tried, key=lambda each: float(each.cost)).x
