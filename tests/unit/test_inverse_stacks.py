@@ -839,7 +839,11 @@ def test_searches_try_no_more_stacks_of_three_interfaces_a_lobe_than_of_two(
     sizes = list[int]()
 
     def counted(step: Callable[..., Any]) -> Callable[..., Any]:
-        return lambda paths, *rest: (sizes.append(len(paths.cost)), step(paths, *rest))[1]
+        def noted(paths: Any, *rest: Any) -> Any:
+            sizes.append(len(paths.cost))
+            return step(paths, *rest)
+
+        return noted
 
     for name in ("with_upper", "with_last"):
         monkeypatch.setattr(stacks, name, counted(getattr(stacks, name)))
