@@ -101,7 +101,7 @@ def nearer(present: DraggedStack, answer: Nearest, count: int, rng: np.random.Ge
     points = np.clip(x[:, None] + spread * rng.normal(size=(len(x), count)), *(end[:, None] for end in space.box))
     points[held] = x[held, None]
     points = points[:, space.margins(space.bounds, points).min(axis=0) >= -SLACK]
-    line = Line(present.point, space.goal(present.now(answer.wish)), space.goal(answer.wish), held, caps)
+    line = Line(answer.stack.point, space.goal(present.now(answer.wish)), space.goal(answer.wish), held, caps)
 
     def ahead(readings: np.ndarray, wider: float, most: int) -> np.ndarray:
         part, off = np.transpose([line.placed(reading) for reading in readings.T])
