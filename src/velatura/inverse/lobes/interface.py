@@ -338,7 +338,7 @@ class _Dielectrics(Batch):
         return Layers("dielectric", eta, None, self.roughness, 0.0)
 
     def excess(self, log_u: Array) -> Array:
-        """What they reflect beyond r, in the channel that needs most, by the logarithm of u + FAINT."""
+        """The logarithm of what they reflect over r, in the channel that needs most, by that of u + FAINT."""
         # Both as logarithms, in which it is almost straight where next to nothing is reflected, too
         reflectance = self.above.reflectance(self.layers(np.exp(log_u) - FAINT))
         return np.asarray(np.min(np.log((reflectance + FAINT) / (self.r + FAINT)), axis=0))
