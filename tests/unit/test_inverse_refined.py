@@ -56,6 +56,19 @@ def missed(target: Target, stack: Stack) -> float:
     return worst
 
 
+@pytest.fixture
+def calls(monkeypatch: pytest.MonkeyPatch) -> list[Any]:
+    """Arguments of all readings of stacks."""
+    found: list[Any] = []
+
+    def read(*args: Any) -> Any:
+        found.append(args)
+        return read_whole(*args)
+
+    monkeypatch.setattr(coordinates, "read_whole", read)
+    return found
+
+
 @pytest.mark.parametrize("alphas", [(0.0685, 0.21), (0.2, 0.3, 0.41)])
 def test_every_reading_of_a_search_is_of_another_stack(
     alphas: tuple[float, ...], monkeypatch: pytest.MonkeyPatch
@@ -78,31 +91,15 @@ def test_every_reading_of_a_search_is_of_another_stack(
 
 
 @pytest.mark.parametrize("name", ["10 c", "15 c", "17 blue over red", "19 b", "22 bottom"])
-def test_targets_of_the_figures_are_met_by_few_calls(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
-    calls = []
-
-    def read(*args: Any) -> Any:
-        calls.append(args)
-        return read_whole(*args)
-
-    monkeypatch.setattr(coordinates, "read_whole", read)
+def test_targets_of_the_figures_are_met_by_few_calls(name: str, calls: list[Any]) -> None:
     target = Target(FIGURES[name])
     assert missed(target, invert_stack(target, MODEL).stack) < 1e-6
     assert len(calls) <= (10 if name != "17 blue over red" else 40)  # of which the first stack does not lead to one
 
 
-def test_a_search_ends_with_the_first_stack_that_stays_far_from_a_wish_without_any(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
+def test_a_search_ends_with_the_first_stack_that_stays_far_from_a_wish_without_any(calls: list[Any]) -> None:
     """A sharp lobe below one of three interfaces that blurs. Expected: the readings of one search by Broyden's method
     at most."""
-    calls = []
-
-    def read(*args: Any) -> Any:
-        calls.append(args)
-        return read_whole(*args)
-
-    monkeypatch.setattr(coordinates, "read_whole", read)
     lobes = [{"energy": 0.1, "alpha": 0.4, "interfaces": 3}, {"energy": 0.03, "alpha": 0.1}]
     assert invert.search(Target(lobes), MODEL) is None
     assert 0 < len(calls) <= SLOW_ROUNDS
@@ -208,9 +205,7 @@ def test_what_is_offered_in_place_of_a_refused_target_has_a_stack(lobes: list[An
         ([{**COAT, "fixed": {"eta": [1.5]}}, {**METAL, "alpha": 0.0, "fixed": {"alpha": [0.1]}}], 0),
     ],
 )
-def test_a_way_out_is_near_and_brings_the_stack_that_has_it(
-    lobes: list[Any], stays: int, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_way_out_is_near_and_brings_the_stack_that_has_it(lobes: list[Any], stays: int, calls: list[Any]) -> None:
     """Expected: the other lobe stays; as JSON it is solved by one reading, and what is fixed is kept."""
     with pytest.raises(Infeasible) as error:
         invert_stack(lobes, MODEL)
@@ -218,13 +213,7 @@ def test_a_way_out_is_near_and_brings_the_stack_that_has_it(
     assert nearest is not None and nearest.start is not None
     assert nearest.lobes[stays].colour == pytest.approx(Target(lobes).lobes[stays].colour, abs=1e-4)
     assert nearest.lobes[stays].roughness == pytest.approx(Target(lobes).lobes[stays].roughness, abs=1e-4)
-    calls = []
-
-    def read(*args: Any) -> Any:
-        calls.append(args)
-        return read_whole(*args)
-
-    monkeypatch.setattr(coordinates, "read_whole", read)
+    calls.clear()
     found = invert_stack(json.loads(json.dumps(nearest.to_dict())), MODEL)
     assert len(calls) == 1 and found.reached is None
     assert missed(nearest, found.stack) < 1e-6

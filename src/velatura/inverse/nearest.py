@@ -16,7 +16,7 @@ import numpy as np
 from velatura.inverse.lobes.target import Target
 from velatura.inverse.local.coordinates import Bound
 from velatura.inverse.local.dragged import DraggedStack
-from velatura.inverse.local.line import EXACT, QUICK, Line, Reached
+from velatura.inverse.local.line import EXACT, KNOWN, QUICK, Line, Reached
 from velatura.inverse.reasons import because
 from velatura.inverse.solution import EFFORTS, in_closed_form
 from velatura.stack import Stack
@@ -29,7 +29,6 @@ UNLIKE = 1e-3  # energy or variance by which a stack differs from the nearest th
 HALVINGS = 6  # of the way that is left, where other searches are looked at
 DIMMED = 0.7  # share of the energy of a lobe that it has in any case if it is blurred more
 LEAST = 1e-3  # part of the way that is no change
-DIGITS = 9  # of coordinates that a search begins from
 BEYOND = 0.05  # parts of the way by which models differ
 ROUNDED = 1e-3  # share of an energy by which a wish may be off, that is not worth a word
 
@@ -73,7 +72,7 @@ def nearest(present: DraggedStack, wish: Target, now: Target | None = None, quic
     """
     quick = quick and present.space.slow
     if present.space.slow:
-        present = present.rounded(DIGITS)
+        present = present.rounded(KNOWN)
     possible = present.achromatic(wish)
     grey = _colour_lost(present, wish, possible)
     if present.missed(possible, present.space.counted) < EXACT:

@@ -94,11 +94,10 @@ class Line:
                 break
         settled = search.settled
         if settled or not whole:
-            search.refine(search.line, readings[0])
+            search.land(readings[0])
             if self.enough < QUICK:
                 search.refine(self, readings[0])
-        _, best = search.best
-        best = best.unrounded
+        best = search.best[1].unrounded
         found = self._bounded(self._reached(best.x, best.value), _Correction.fitted(space, search.read, best))
         return dataclasses.replace(found, settled=settled)
 
@@ -414,25 +413,35 @@ class _Search:
             if self._ends():
                 return
 
+    def land(self, readings: int) -> None:
+        """Read at most so many points more, which lead back to the line, unless the search has ended on it."""
+        if not self._ended and self.best[0].off >= self.line.enough:
+            self._landed(self.best)
+            self._led(readings)
+
     def refine(self, line: Line, readings: int) -> None:
         """Read at most so many points more, until they miss no more than the line allows."""
-        exact, missed, self.line = line.enough < QUICK, self.line.enough, line
-        if exact:
-            self.read = [each.unrounded for each in self.read]
-            self.seen = [(at, each.unrounded) for at, each in self.seen]
-        best, there = self.best, self.seen[-1]
-        on_line = self.settled and there[0].off <= QUICKLY_ON_LINE
-        if not exact and (on_line or best[0].off < line.enough):
-            return
-        if on_line:
-            self._aimed(there[1], self.aim, missed)
+        missed, self.line = self.line.enough, line
+        self.read = [each.unrounded for each in self.read]
+        self.seen = [(at, each.unrounded) for at, each in self.seen]
+        if self._ended:
+            self._aimed(self.seen[-1][1], self.aim, missed)
         else:
-            self._landed(best)
+            self._landed(self.best)
+        self._led(readings)
+
+    @property
+    def _ended(self) -> bool:
+        """Whether the search has ended near the line."""
+        return self.settled and self.seen[-1][0].off <= QUICKLY_ON_LINE
+
+    def _led(self, readings: int) -> None:
+        """Read at most so many points; where that leads elsewhere, back to the line from the best one before."""
+        best = self.best
         for _ in range(readings):
             if self._ends():
                 return
             if not self.landing and self.last == np.inf:
-                # This leads elsewhere
                 self._landed(best)
 
     def _landed(self, at: tuple[Reached, _Read]) -> None:
