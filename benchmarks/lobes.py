@@ -111,11 +111,12 @@ def lobe_of(facets: Sequence[Facets], k: int, roughness: Roughness) -> Refracted
     def leaving(cosine: Array) -> Array:
         assert first is not None
         cos2 = np.maximum(1 - (1 - cosine * cosine) / np.mean(facets[first].above) ** 2, 0)
-        above = np.sqrt(cos2 + widths.steeper(facets[first].alpha_u, facets[first].alpha_v) * (1 - cos2))
+        above = np.sqrt(cos2 + widths.steeper(facets[first].alpha_u, facets[first].alpha_v, of_metal) * (1 - cos2))
         return np.asarray(1 - facets[first].reflectance(above).mean(axis=0))
 
     first = widths.first_step([each.step for each in facets[:k]])
-    n = float(np.mean(facets[k].above))
+    n, last = float(np.mean(facets[k].above)), facets[-1]
+    of_metal = (last.alpha_u, last.alpha_v) if last.opaque and last.brushed else None
     if first is None:
         return RefractedLobe(1.0, roughness, n, reflected)
     return RefractedLobe(1.0, roughness, n, None if facets[k].opaque else reflected, leaving)

@@ -63,7 +63,7 @@ class Lighting:
     inside: bool = True
 
 
-SLANTED = Lighting((0.9, 0.5, 0.2, 0.08), 0.2, False)  # mirrored light is on no border of bins
+SLANTED = Lighting((0.9, 0.5, 0.2, 0.08), 0.28, False)  # mirrored light is far from borders of bins
 
 
 @dataclass(frozen=True)

@@ -12,6 +12,7 @@ import velatura as vt
 from velatura import Interface, Medium, Stack, kernel
 from velatura.model import DEFAULT, named
 from velatura.model.rough_interface import Facets
+from velatura.model.solved import brushing
 from velatura.model.solved.energies.adding import Part, parts
 from velatura.model.solved.lobes import refracted_lobe, widths
 from velatura.model.solved.lobes.refracted_lobe import RefractedLobe
@@ -140,15 +141,20 @@ WALKED = {
     "lacquered": [Interface(eta=1.5, alpha=0.1), Interface(eta=0.3, k=3.0, alpha=(0.3, 0.04), rotation=60)],
     "glass": [Interface(eta=1.5, alpha=0.2), Interface(eta=2.0, alpha=0.2)],
 }
-CROSSED = {
-    "one coat": [Interface(eta=1.4, alpha=(0.26, 0.06), rotation=90), Interface(eta=0.5, k=5.0, alpha=(0.2, 0.02))],
-    "two coats": [
+PARTED = {
+    "a smooth coat": [Interface(eta=1.5), Interface(eta=0.5, k=5.0, alpha=(0.4, 0.05), rotation=120)],
+    "a rough coat": [Interface(eta=1.5, alpha=0.17), Interface(eta=0.5, k=5.0, alpha=(0.2, 0.02), rotation=80)],
+    "a crossed coat": [
+        Interface(eta=1.4, alpha=(0.26, 0.06), rotation=90),
+        Interface(eta=0.5, k=5.0, alpha=(0.2, 0.02)),
+    ],
+    "two crossed coats": [
         Interface(eta=1.65, alpha=(0.35, 0.04), rotation=5),
         Interface(eta=1.58, alpha=(0.35, 0.05), rotation=-75),
         Interface(eta=0.5, k=5.0, alpha=(0.34, 0.05), rotation=5),
     ],
 }
-ASTRAY = {"one coat": 0.06, "two coats": 0.05}
+ASTRAY = {"a smooth coat": 0.04, "a rough coat": 0.05, "a crossed coat": 0.06, "two crossed coats": 0.05}
 FARTHEST = {"brushed": 0.045, "lacquered": 0.04}
 
 
@@ -194,11 +200,12 @@ def test_lobes_are_as_wide_as_walks(name: str) -> None:
         assert 0.5 * np.abs(light - truth[i]).sum() < FARTHEST.get(name, 0.05) * truth[i].sum()
 
 
-@pytest.mark.parametrize("name", CROSSED)
-def test_light_below_crossed_facets_goes_where_walks_go(name: str) -> None:
-    """Total variation over 20 x 20 bins, of which walks make .01; .068 and .069 with one lobe below."""
+@pytest.mark.parametrize("name", PARTED)
+def test_light_of_brushed_metals_goes_where_walks_go(name: str) -> None:
+    """Total variation over 20 x 20 bins, of which walks make .01; .079 and .057 below isotropic coats with
+    one lobe of the metal, and .068 and .069 below crossed ones."""
     kernel.require_llvm()
-    stack, bins, cosine, phi = Stack(CROSSED[name]), 20, 0.5, 0.2
+    stack, bins, cosine, phi = Stack(PARTED[name]), 20, 0.5, 0.28
     truth = vt.reference.distribution(stack, cosine, phi, 200_000, 1, True, bins=bins).reflected.mean(axis=(0, 1))
     fine = 8
     axis = (np.arange(bins * fine) + 0.5) / (0.5 * bins * fine) - 1
@@ -211,7 +218,10 @@ def test_light_below_crossed_facets_goes_where_walks_go(name: str) -> None:
     light = np.zeros(len(up))
     light[up] = np.mean(value, axis=0) / wo[2] / (0.5 * bins * fine) ** 2
     light = light.reshape(bins, fine, bins, fine).sum(axis=(1, 3))
-    assert 0.5 * np.abs(light - truth).sum() < ASTRAY[name] * truth.sum()
+    # Beside the mirror direction, where light of a smooth coat is narrower than these points
+    middle = (np.arange(bins) + 0.5) / (0.5 * bins) - 1
+    beside = np.hypot(middle[:, None] + wi[0], middle + wi[1]) > 0.12
+    assert 0.5 * np.abs(light - truth)[beside].sum() < ASTRAY[name] * truth[beside].sum()
 
 
 def test_lobes_are_parted_as_far_as_facets_cross() -> None:
@@ -220,8 +230,23 @@ def test_lobes_are_parted_as_far_as_facets_cross() -> None:
     def crossing(eta: float = 1.5, alpha: Any = (0.3, 0.05), rotation: float = 90) -> float:
         coat = Interface(eta=eta, alpha=alpha, rotation=rotation)
         layers = found(coat, Interface(eta=0.2, k=3.0, alpha=(0.2, 0.04)))
-        return widths.crossing([part for part in layers if isinstance(part, Facets)])
+        return brushing.crossing([part for part in layers if isinstance(part, Facets)])
 
     assert crossing(rotation=0) == crossing(alpha=0.2) == crossing(eta=1.0) == 0
     assert crossing(alpha=(0.05, 0.3), rotation=0) == pytest.approx(crossing())
     assert 0 < crossing(rotation=20) < crossing(rotation=45) < crossing() <= 1
+
+
+def test_light_that_coats_throw_back_is_apart_for_long_facets_alone() -> None:
+    """Lobes of isotropic metals are whole, and those below coats that make no step of the index; crossed facets part
+    the lobe otherwise."""
+
+    def apart(eta: float = 1.5, across: float = 0.02, coat: Any = 0.1, **base: Any) -> float:
+        metal = Interface(**({"eta": 0.2, "k": 3.0} | base), alpha=(0.2, across))
+        return brushing.thrown_back(
+            [part for part in found(Interface(eta=eta, alpha=coat), metal) if isinstance(part, Facets)]
+        )
+
+    assert apart(eta=1.0) == apart(across=0.2) == apart(across=0.17) == apart(k=None) == 0
+    assert 0 < apart(across=0.13) < apart(across=0.1) < apart() < 1
+    assert 0 < apart(coat=(0.02, 0.2)) < 0.1 * apart() < apart(coat=(0.2, 0.02))

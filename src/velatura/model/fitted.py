@@ -29,7 +29,9 @@ Q = 1.52  # powers of which widths add; between Cauchy (1) and Gauss (2), as the
 # How cosines grow with roughness, in the plane and across it: of the interfaces above, and of the lobe's own
 STEEPNESS = (9.0, 1.2)
 OWN_STEEPNESS = (0.53, 1.5)
-LEAVING_STEEPNESS = 3.0  # likewise of the cosine at which light that leaves meets brushed facets
+# Likewise of the cosine at which light that leaves meets brushed facets, and those of coats above a brushed metal
+LEAVING_STEEPNESS = 3.0, 2.0
+LONG = 0.2, 0.6  # 1 - alpha_min / alpha_max from which facets of a metal count as long, and as a whole
 SLIGHT_STEP = 0.2  # step of the index over the greatest one, that does not count
 CORRECTION_MAX = 1.5  # logarithm of a correction
 CORRECTION_FADE = 0.1  # sum of steps of the logarithm of the index below which corrections fade
@@ -77,6 +79,16 @@ CROSSING, CROSSING_FADE = 0.08, 0.02
 NEAR_MIRROR: dict[str, float] = {"1": -0.155, "coats": 0.232, "slant": -0.102}
 TAIL: dict[str, float] = {"1": 0.78, "coats": -1.01, "slant": 0.6, "slanted coats": -0.29}
 TAIL_ODDS: dict[str, float] = {"1": -1.421, "slant": -0.263, "brighter": 0.808}
+
+# Lobes of metals with long facets that are parted by how often light meets them. Of light that meets them once: what
+# rough coats add to the logarithms of the widths along both axes, how that changes with their roughness, and what they
+# add across the plane of incidence at grazing angles
+ONCE, ONCE_ROUGH, ONCE_ACROSS = (0.18, 0.26), -0.65, 0.26
+# Of light that coats throw back: the logarithms of widths beyond first order, and what rough coats add; its share, by
+# how much brighter it makes the lobe, at the normal, and how much less it is at the horizon
+AGAIN_WIDER, AGAIN_COATS = (1.0, 0.49), -0.56
+AGAIN_SHARE = 0.94, 0.47
+BLOCKED_BY_COATS = 0.28  # light of repeated facets of coats beside that of the metal's own, which such a lobe has
 
 # Light that passes (fidelity.py) -------------------------------------------------------------------------------------
 

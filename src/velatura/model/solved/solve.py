@@ -17,7 +17,7 @@ from velatura.media import of_material
 from velatura.model.base import Model
 from velatura.model.context import Context, channels
 from velatura.model.smooth_interface import smooth_interfaces
-from velatura.model.solved import reciprocal_balance, sample_allocation, wide_light
+from velatura.model.solved import brushing, reciprocal_balance, sample_allocation, wide_light
 from velatura.model.solved.bsdf import ROOTS, Shape, Side, SideView, Solved
 from velatura.model.solved.columns import Columns, Declaration
 from velatura.model.solved.energies.adding import Part, interfaces, parts
@@ -708,7 +708,7 @@ def layout_of(materials: Sequence[Material], veiled: Set[int] = frozenset()) -> 
     steps = np.max([[facets.step for facets in found] for found in each], axis=0)
     turns = np.max([[facets.step * max(facets.alpha_u, facets.alpha_v) for facets in found] for found in each], axis=0)
     kinds = [(k, veil, False) for k in range(len(steps)) for veil in (False, True) if not veil or k in veiled]
-    kinds += [(len(steps) - 1, False, True)] if any(map(widths.crossing, filter(None, each))) else []
+    kinds += [(len(steps) - 1, False, True)] if any(map(brushing.parts_lobe, filter(None, each))) else []
     rough = widths.stepped(turns, widths.LEAST_TURN)
     above = np.array([[np.mean(facets.above) / np.mean(found[0].above) for facets in found] for found in each])
     denser = np.all(above >= 1, axis=0).tolist()
@@ -871,7 +871,9 @@ def shapes_of(material: Material, drawn: Sequence[LobeSpec]) -> list[Shape]:
     for layer in found:
         indices.append(MediumIndex.of(indices[-1].n * layer.n12))
     alphas = [(layer.alpha_u, layer.alpha_v) for layer in material.interfaces]
-    steeper = [None if is_same(u, v) else widths.steeper(u, v) for u, v in alphas]
+    opaque = [each for layer, each in zip(material.interfaces, alphas) if layer.kind != "dielectric"]
+    of_metal = next((each for each in opaque if not is_same(*each)), None)
+    steeper = [widths.steeper(u, v, of_metal) if of_metal or not is_same(u, v) else None for u, v in alphas]
     shapes = []
     for lobe in drawn:
         own, k = found[lobe.interface], lobe.first

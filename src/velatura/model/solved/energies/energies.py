@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 from velatura.model import fitted
 from velatura.model.rough_interface import Facets
 from velatura.model.solved import sample_allocation
+from velatura.model.solved.brushing import thrown_back
 from velatura.model.solved.energies.adding import (
     Lambert,
     Leaving,
@@ -209,16 +210,19 @@ def _undisturbed(found: Sequence[Part]) -> dict[int, float]:
 
 def _along(found: Sequence[Part]) -> float:
     """Share of the light of repeated facets in no lobe that the lobe of a metal has, since the remainder has no axes:
-    that which brushed facets of little step block, inside other media, leaves much as the rest of the lobe does."""
+    that which brushed facets of little step block, inside other media, leaves much as the rest of the lobe does, and so
+    does most of what the metal's own long facets block."""
     facets = [part for part in found if isinstance(part, Facets)]
     *coats, last = facets
     if not last.opaque or not coats:
         return 0.0
-    blocked = np.array([coat.brushed * (coat.alpha_u**2 + coat.alpha_v**2) for coat in coats])
+    rough = np.array([each.alpha_u**2 + each.alpha_v**2 for each in facets])
+    blocked = rough[:-1] * [coat.brushed for coat in coats]
     steps = np.array([coat.step for coat in coats])
     onward = np.exp(-steps / fitted.UNDISTURBED) * steps / (steps + fitted.ALONG_FADE)
     share = float((blocked * onward)[1:].sum() / max(blocked.sum(), TINY))
-    return min(fitted.ALONG * last.brushed * share, 1.0)
+    of_metal = rough[-1] / max(rough[-1] + fitted.BLOCKED_BY_COATS * rough[:-1].sum(), TINY)
+    return min(fitted.ALONG * last.brushed * share + thrown_back(facets) * of_metal, 1.0)
 
 
 def _taken(share: Array, again: Array, once: Array) -> Array:

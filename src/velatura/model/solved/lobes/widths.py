@@ -12,7 +12,8 @@ below it.
 What first order leaves open is in `CORRECTION`: light that goes back and forth, and that total reflection picks out.
 It turns above all on how much brighter a lobe is than it would be if its light met each interface once.
 Lobes of metals whose facets are long along an axis have `BRUSHED_CORRECTION` in its place, and turn little with the
-plane of incidence. Where these cross brushed facets above, the lobe is parted: its tail lies along its own.
+plane of incidence, and are parted into light that meets the metal once, and light that coats throw back to it. Where
+facets cross brushed ones above, the lobe is parted into one about the mirror direction and a tail along its own facets.
 
 Tensors live in the frame of the plane of incidence (x in the plane, y across it), so that they turn with the layers.
 Values are NumPy's, for directions (M,).
@@ -32,6 +33,7 @@ from velatura import ops
 from velatura.model import fitted
 from velatura.model.guards import ALPHA_MIN
 from velatura.model.rough_interface import Facets
+from velatura.model.solved.brushing import crossing, long, thrown_back
 from velatura.model.solved.energies.adding import Part
 from velatura.model.solved.energies.media import Slab
 from velatura.model.solved.guards import COS_OF_WIDTHS_MIN, WIDTH_ALPHA_MAX
@@ -94,6 +96,14 @@ class Tensor:
     def size(self) -> Array:
         """Width on average over directions."""
         return np.asarray(np.sqrt(0.5 * (self.xx + self.yy)))
+
+    def scaled(self, along: Array, across: Array) -> Tensor:
+        """Tensor of widths that are longer along its axes."""
+        return Tensor.turned(along * self.width(self.angle), across * self.width(self.angle + AXES[1]), self.angle)
+
+    def mixed(self, other: Tensor, share: Array | float) -> Tensor:
+        """The tensor with a share of another one."""
+        return Tensor(*(x + share * (y - x) for x, y in zip(vars(self).values(), vars(other).values())))
 
     def roughness(self, phi: Array) -> Roughness:
         """Roughness in the frame of the stack; `phi` is the azimuth of the plane."""
@@ -192,14 +202,14 @@ def first_step(steps: Sequence[float]) -> int | None:
 
 
 class Tail(NamedTuple):
-    """The part of a lobe that lies along the facets of its own interface, with its share of the light, (M,)."""
+    """The wider part of a lobe, with its share of the light, (M,)."""
 
     tensor: Tensor
     share: Array
 
 
 class Width(NamedTuple):
-    """The roughness of a lobe, that of what its tail leaves of it, and the tail, None where its facets cross none."""
+    """The roughness of a lobe, that of what its tail leaves of it, and the tail, None where it has none."""
 
     tensor: Tensor
     near: Tensor
@@ -233,7 +243,11 @@ def each(found: Sequence[Part], cos_theta: Array, phi: Array, energies: Array) -
         if coats:
             first = _turned_aside(_first_order(own, coats, n, cosine), coats, n, cosine)
             seen = features(part, first, own, coats, cos_theta, share, energies[len(result)])
-            result.append(_parted(_corrected(first, seen), own, seen, crossing([*(x.facets for x in coats), part])))
+            facets = [*(coat.facets for coat in coats), part]
+            width = _parted(_corrected(first, seen), own, seen, crossing(facets))
+            if apart := thrown_back(facets):
+                width = _by_order(width, first, _again(own, coats, n, cosine), cos_theta, seen, apart)
+            result.append(width)
         else:
             result.append(Width(own, own, None))
         if not part.opaque:
@@ -338,22 +352,7 @@ def _corrected(first: Tensor, seen: dict[str, Array]) -> Tensor:
     apart = apart * (1 - seen["brushed"] * (1 - each["coats"].max(axis=0)) ** turns)
     fading = seen["steps"] / (seen["steps"] + fitted.CORRECTION_FADE)
     u, v, x = (np.exp(np.clip(fading * each, -fitted.CORRECTION_MAX, fitted.CORRECTION_MAX)) for each in (*axes, apart))
-    scaled = Tensor.turned(u * first.width(first.angle), v * first.width(first.angle + AXES[1]), first.angle)
-    return scaled.stretched(x, 1 / x)
-
-
-def crossing(facets: Sequence[Facets]) -> float:
-    """How far the long facets of an opaque interface cross those of an interface above: from 0, for parallel ones,
-    isotropic ones and such as make no step of the index, to 1."""
-    *coats, last = facets
-    if not last.opaque:
-        return 0.0
-    along = [each.rotation + (each.alpha_v > each.alpha_u) * AXES[1] for each in facets]
-    across = (
-        coat.brushed * np.sin(angle - along[-1]) ** 2 * coat.step / (coat.step + fitted.CROSSING_FADE)
-        for coat, angle in zip(coats, along)
-    )
-    return float(-np.expm1(-last.brushed * max(across, default=0.0) / fitted.CROSSING))
+    return first.scaled(u, v).stretched(x, 1 / x)
 
 
 def _parted(tensor: Tensor, own: Tensor, seen: dict[str, Array], crossed: float) -> Width:
@@ -378,11 +377,50 @@ def _parted(tensor: Tensor, own: Tensor, seen: dict[str, Array], crossed: float)
     return Width(tensor, near, Tail(tail, share))
 
 
-def steeper(alpha_u: Value, alpha_v: Value) -> Value:
-    """Share of sin^2 by which the square of the cosine grows at which light that leaves meets brushed facets, in any
-    dialect."""
-    brushed = 1 - ops.divide(ops.minimum(alpha_u, alpha_v), ops.maximum(alpha_u, alpha_v))
-    return ops.minimum((0.5 * fitted.LEAVING_STEEPNESS) * brushed * (alpha_u * alpha_u + alpha_v * alpha_v), 1.0)
+def _again(own: Tensor, coats: Sequence[_Coat], n: float, cosine: Array) -> Tensor:
+    """To first order, of light that meets the facets of an interface twice, and in between those of a coat from inside,
+    each as often as it makes a part of all steps of the index."""
+    steps = np.array([coat.facets.step for coat in coats])
+    shares = (steps / max(steps.sum(), LEAST_STEP)) ** (1 / fitted.Q)
+    met = [coat.tensor.stretched(share, share) for coat, share in zip(coats, shares)]
+    both_ways = [coat.moved.stretched(0.5 / (n * cosine), 0.5 / (n * cosine)) for coat in coats] * 2
+    return _sum([own, own, *met, *both_ways])
+
+
+def _by_order(
+    parted: Width, first: Tensor, again: Tensor, cos_theta: Array, seen: dict[str, Array], apart: float
+) -> Width:
+    """A lobe of long facets below coats as two: light that meets them once, and light that coats throw back to them.
+
+    The first is as wide as first order has it below smooth coats, and a little wider below rough ones, which at
+    grazing angles also turn it across the plane of incidence.
+    """
+    coats = seen["coats"].max(axis=0)
+    once = first.scaled(*(np.exp((wider + fitted.ONCE_ROUGH * seen["rough"]) * coats) for wider in fitted.ONCE))
+    across = np.exp(fitted.ONCE_ACROSS * coats * (1 - cos_theta) ** 2)
+    once = once.stretched(1 / across, across)
+    again = again.scaled(*(np.exp(wider + fitted.AGAIN_COATS * coats) for wider in fitted.AGAIN_WIDER))
+    brighter, slant = np.maximum(seen["brighter"], 0), seen["slant"]
+    share = -apart * np.expm1(-brighter * (fitted.AGAIN_SHARE[0] - fitted.AGAIN_SHARE[1] * slant * slant))
+    near = parted.near.mixed(once, apart)
+    if parted.tail:
+        tensor, of_axes = parted.tail
+        again, share = tensor.mixed(again, ops.divide(share, share + of_axes)), share + of_axes
+    return Width(parted.tensor, near, Tail(again, share))
+
+
+def steeper(alpha_u: Value, alpha_v: Value, of_metal: tuple[Value, Value] | None) -> Value:
+    """Share of sin^2 by which the square of the cosine grows at which light that leaves meets facets that are brushed,
+    or above a brushed metal of roughnesses `of_metal`, in any dialect."""
+    of_own, of_others = fitted.LEAVING_STEEPNESS
+    steepness = of_own * _brushing(alpha_u, alpha_v)
+    if of_metal:
+        steepness = ops.maximum(steepness, of_others * long(_brushing(*of_metal)))
+    return ops.minimum(0.5 * steepness * (alpha_u * alpha_u + alpha_v * alpha_v), 1.0)
+
+
+def _brushing(alpha_u: Value, alpha_v: Value) -> Value:
+    return 1 - ops.divide(ops.minimum(alpha_u, alpha_v), ops.maximum(alpha_u, alpha_v))
 
 
 def veil(found: Sequence[Part], k: int, cos_theta: Array, tensor: Tensor) -> Tensor:
