@@ -281,9 +281,13 @@ def test_another_medium_is_shaded_by_the_same_program() -> None:
 # Materials that are solved
 
 
-@pytest.mark.parametrize(("name", "fetches"), [("coated-gold", 12), ("coated-rough-metal", 4), ("frosted-glass", 54)])
-def test_a_solved_material_takes_few_fetches(name: str, fetches: int) -> None:
-    """Energies, which neither values nor samples need, are read apart; and nothing of the layers is."""
+@pytest.mark.parametrize(
+    ("name", "fetches", "lines"),
+    [("coated-gold", 20, 370), ("coated-rough-metal", 4, 310), ("frosted-glass", 54, None)],
+)
+def test_a_solved_material_takes_few_fetches(name: str, fetches: int, lines: int | None) -> None:
+    """Energies, which neither values nor samples need, are read apart; and nothing of the layers is. The lobe of a
+    brushed metal is two."""
     made = shader(vt.preset(name))
     assert isinstance(made.baked, SolvedLookUp)
     columns, energies = made.baked.groups
@@ -294,8 +298,7 @@ def test_a_solved_material_takes_few_fetches(name: str, fetches: int) -> None:
     assert "vt_tables" not in made.text
     assert made.columns is not None
     assert made.columns.shape == (made.baked.height, made.baked.nodes[0], 4)
-    if name.startswith("coated"):
-        assert made.text.count("\n") <= 310
+    assert lines is None or made.text.count("\n") <= lines
 
 
 @pytest.mark.parametrize(

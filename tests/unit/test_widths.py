@@ -12,7 +12,7 @@ import velatura as vt
 from velatura import Interface, Medium, Stack, kernel
 from velatura.model import DEFAULT, named
 from velatura.model.rough_interface import Facets
-from velatura.model.solved import brushing
+from velatura.model.solved.energies import brushing
 from velatura.model.solved.energies.adding import Part, parts
 from velatura.model.solved.lobes import refracted_lobe, widths
 from velatura.model.solved.lobes.refracted_lobe import RefractedLobe

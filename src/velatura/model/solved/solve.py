@@ -17,9 +17,10 @@ from velatura.media import of_material
 from velatura.model.base import Model
 from velatura.model.context import Context, channels
 from velatura.model.smooth_interface import smooth_interfaces
-from velatura.model.solved import brushing, reciprocal_balance, sample_allocation, wide_light
+from velatura.model.solved import reciprocal_balance, sample_allocation, wide_light
 from velatura.model.solved.bsdf import ROOTS, Shape, Side, SideView, Solved
 from velatura.model.solved.columns import Columns, Declaration
+from velatura.model.solved.energies import brushing
 from velatura.model.solved.energies.adding import Part, interfaces, parts
 from velatura.model.solved.energies.energies import INCIDENCES, MODES, SAMPLES, Energies, energies, media_of
 from velatura.model.solved.energies.media import Slab, escaped

@@ -18,7 +18,6 @@ from numpy.typing import NDArray
 from velatura.model import fitted
 from velatura.model.rough_interface import Facets
 from velatura.model.solved import sample_allocation
-from velatura.model.solved.brushing import thrown_back
 from velatura.model.solved.energies.adding import (
     Lambert,
     Leaving,
@@ -30,6 +29,7 @@ from velatura.model.solved.energies.adding import (
     parts,
     settings,
 )
+from velatura.model.solved.energies.brushing import thrown_back
 from velatura.model.solved.energies.interfaces import Setting
 from velatura.model.solved.energies.media import Slab, Straight
 from velatura.model.solved.energies.modes import Basis, Even, Relative

@@ -33,8 +33,8 @@ from velatura import ops
 from velatura.model import fitted
 from velatura.model.guards import ALPHA_MIN
 from velatura.model.rough_interface import Facets
-from velatura.model.solved.brushing import crossing, long, thrown_back
 from velatura.model.solved.energies.adding import Part
+from velatura.model.solved.energies.brushing import crossing, long, thrown_back
 from velatura.model.solved.energies.media import Slab
 from velatura.model.solved.guards import COS_OF_WIDTHS_MIN, WIDTH_ALPHA_MAX
 from velatura.model.solved.lobes import refracted_lobe
@@ -378,8 +378,8 @@ def _parted(tensor: Tensor, own: Tensor, seen: dict[str, Array], crossed: float)
 
 
 def _again(own: Tensor, coats: Sequence[_Coat], n: float, cosine: Array) -> Tensor:
-    """To first order, of light that meets the facets of an interface twice, and in between those of a coat from inside,
-    each as often as it makes a part of all steps of the index."""
+    """Tensor, to first order, of light that meets the facets of an interface twice, and in between those of a coat from
+    inside, each as often as it makes a part of all steps of the index."""
     steps = np.array([coat.facets.step for coat in coats])
     shares = (steps / max(steps.sum(), LEAST_STEP)) ** (1 / fitted.Q)
     met = [coat.tensor.stretched(share, share) for coat, share in zip(coats, shares)]
