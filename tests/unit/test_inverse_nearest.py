@@ -13,7 +13,8 @@ from velatura.inverse import Infeasible, Target, invert, invert_stack
 from velatura.inverse.lobes.interface import CONDUCTOR_MAX
 from velatura.inverse.local.coordinates import Space
 from velatura.inverse.local.dragged import DraggedStack, seen
-from velatura.inverse.nearest import Nearest, nearest
+from velatura.inverse.local.line import Line
+from velatura.inverse.nearest import READINGS, Nearest, nearest
 from velatura.model import Model, named
 from velatura.model.variance import Roughness
 from velatura.optics import fresnel
@@ -128,6 +129,25 @@ def test_rounding_does_not_change_an_answer(monkeypatch: pytest.MonkeyPatch) -> 
     monkeypatch.setattr(Space, "_solved", lambda *where: read(*where) * (1 + 1e-13 * rng.normal()))
     found = [answer(coated(scale), wish, model, quick=True) for scale in (1, 1 + 1e-14)]
     assert found[0].stack.stack == found[1].stack.stack and found[0].part > 0.5
+
+
+def test_a_search_ends_where_nothing_leads_back_to_the_line(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Readings that are all the same, beside the line, half of the way on. Expected: the start, after fewer readings
+    than may follow to lead back to the line alone."""
+    model = named("velatura")
+    now = seen(METAL, Target([{"energy": 0.1}, {"energy": 0.1, "base": "conductor"}]), model)
+    wish = now.with_energy(0, (0.08, 0.08, 0.08))
+    present = DraggedStack.of(METAL, wish, model)
+    assert present is not None
+    here, goal, read = present.point.reading.value, present.space.goal(wish), list[Any]()
+
+    def beside(_: Space, x: Any) -> Any:
+        read.append(x)
+        return (here + goal) / 2 + np.eye(len(here))[-1] / 10
+
+    monkeypatch.setattr(Space, "_solved", beside)
+    found = Line(present.point, here, goal).last(READINGS)
+    assert found.part == 0 and 0 < len(read) < READINGS[0]
 
 
 def test_a_refusal_of_a_wish_from_a_material_offers_the_nearest_answer_first() -> None:

@@ -97,6 +97,61 @@ def test_targets_of_the_figures_are_met_by_few_calls(name: str, calls: list[Any]
     assert len(calls) <= (10 if name != "17 blue over red" else 40)  # of which the first stack does not lead to one
 
 
+#: Stacks from whose lobes those of the first one that the closed form finds are far, or that it leads to by none; the
+#: interfaces of their second lobe, and the most readings that a search takes.
+FAR = {
+    "rarer below denser": (
+        [
+            Interface(eta=2.08, alpha=0.114),
+            Interface(eta=1.72, alpha=0.151),
+            Interface(eta=1.25, alpha=0.151),
+            Medium(sigma_a=(0.15, 0.05, 0.08)),
+            Interface(eta=(1.69, 0.75, 0.4), k=(2.83, 1.41, 0.65), alpha=0.193),
+        ],
+        2,
+        13,
+    ),
+    "out of reach": (
+        [
+            Interface(eta=1.36, alpha=0.14),
+            Medium(sigma_a=(0.38, 0.14, 0.17)),
+            Interface(eta=2.17, alpha=0.188),
+            Medium(sigma_a=(0.26, 0.29, 0.15)),
+            Interface(eta=(0.66, 1.0, 1.05), k=(2.63, 3.59, 3.07), alpha=0.249),
+        ],
+        1,
+        11,
+    ),
+}
+
+
+@pytest.mark.parametrize("name", FAR)
+def test_lobes_far_from_those_of_the_first_stack_take_few_readings(name: str, calls: list[Any]) -> None:
+    """Expected: half of those, or three quarters, that a search took which gave up what led astray."""
+    layers, interfaces, most = FAR[name]
+    lobe = {"energy": 0.1, "alpha": 0.1}
+    form = [lobe, {**lobe, "interfaces": interfaces}, {**lobe, "base": "conductor"}]
+    target = seen(Stack(layers), Target(form), MODEL)
+    calls.clear()
+    assert missed(target, invert_stack(target, MODEL).stack) < 1e-6
+    assert 0 < len(calls) <= most
+
+
+@pytest.mark.parametrize("alpha", [0.188, (0.1, 0.25)])
+def test_readings_follow_nothing_that_lies_below(alpha: Any) -> None:
+    """Expected: slopes by differences of the model itself that vanish, and some along all coordinates that are free."""
+    layers, *_ = FAR["out of reach"]
+    layers = [*layers[:2], Interface(eta=2.17, alpha=alpha, rotation=25), *layers[3:]]
+    form = [{"energy": 0.1, "alpha": 0.1}, {"energy": 0.1, "alpha": alpha}]
+    target = Target([*form, {"energy": 0.1, "alpha": 0.2, "base": "conductor"}])
+    dragged = DraggedStack.of(Stack(layers), seen(Stack(layers), target, MODEL), MODEL)
+    assert dragged is not None
+    space, x = dragged.space, dragged.point.x
+    slopes = np.abs(space.differences(x, np.arange(len(x))).slopes)
+    assert slopes[~space.followed].max() < 1e-9
+    assert (slopes[:, space.free].max(axis=0) > 1e-3).all()
+
+
 def test_a_search_ends_with_the_first_stack_that_stays_far_from_a_wish_without_any(calls: list[Any]) -> None:
     """A sharp lobe below one of three interfaces that blurs. Expected: the readings of one search by Broyden's method
     at most."""

@@ -28,7 +28,7 @@ from velatura.inverse.lobes.interface import (
     conductor_tint,
     least,
 )
-from velatura.inverse.lobes.partial_stack import NORMAL, Array, Layers, named_as, read_whole, variance_of, whole
+from velatura.inverse.lobes.partial_stack import NORMAL, Array, Layers, Mask, named_as, read_whole, variance_of, whole
 from velatura.inverse.lobes.target import Target
 from velatura.inverse.reasons import UNMET, because
 from velatura.model import Model
@@ -348,6 +348,17 @@ class Space:
                 found += [3 * own.lobe + c for c in (range(3) if channels == 3 else (own.reference,))]
         return np.array([*found, *(3 * self.lobes + n for n in range(self.entries * len(self.interfaces)))])
 
+    @cached_property
+    def followed(self) -> Mask:
+        """Mask of what coordinates readings follow, (3 K + V I, D): those of the interface that reflects, and of
+        all above."""
+        last = [max(n for n, own in enumerate(self.interfaces) if own.lobe == k) for k in range(self.lobes)]
+        lowest = np.r_[np.repeat(last, 3), np.repeat(np.arange(len(self.interfaces)), self.entries)]
+        found = np.zeros((len(lowest), len(self.box[0])), bool)
+        for n, own in enumerate(self.interfaces):
+            found[:, _coordinates(own)] = (lowest >= n)[:, None]
+        return found
+
     def reach(self, x: Array, share: float, least: float) -> Array:
         """The longest steps, (D,): of reflectances a share of them, `least` at least, and of logarithms of indices."""
         reach = np.full(len(x), np.inf)
@@ -434,6 +445,13 @@ class Space:
             for bound in self.bounds
             if own.reflectances and bound.interface == n and bound.channel == coordinate - own.reflectances.start
         )
+
+
+def _coordinates(own: InterfaceCoordinates) -> list[int]:
+    """The indices of the coordinates of an interface."""
+    spans = [span for span in (own.variance, own.reflectances) if span is not None]
+    places = [n for span in spans for n in range(span.start, span.stop)]
+    return [*places, *(n for n in (own.depth, own.log_index) if n is not None)]
 
 
 @dataclass(frozen=True)

@@ -39,6 +39,7 @@ DIGITS, KNOWN = 7, 9  # of readings of a slow model, and of all else that the se
 BENT = 0.5  # by how much corrections are off their slopes, as a share of the square of a distance
 ROUNDED = 10**-DIGITS  # the same, at least
 BESIDE = 10.0  # part of the way that it is worth to be as much nearer to the line
+HOPE, PATIENCE = 0.5, 4  # share of a miss that a reading must be expected to leave at most, and readings in vain
 
 
 @dataclass(frozen=True)
@@ -79,21 +80,27 @@ class Line:
 
         readings: of a slow model, at most, of one search and of those that go on from where the last one ended, unless
         that got nowhere; as many as the first may follow until the point is exact, if that is asked for. whole: whether
-        only all of the way counts, so that a search ends where it leads astray, or where its end is in sight.
+        only all of the way counts, so that points off the line do as well, and a search ends where nothing leads on.
         """
         space, x = self.start.space, self.start.x
         if not space.slow:
             correction = _Correction.none(space, x)
             x, _ = self._followed(space, x, correction, MET)
             return self._bounded(self._reached(x, space.read(x[:, None])[:, 0]), correction)
-        search = _Search.of(self, whole)
-        for n, most in enumerate(readings):
-            before = search.best[0].part
-            search.go(most)
-            if search.settled or whole or (n and search.best[0].part < before + ONWARDS):
-                break
-        settled = search.settled
-        if settled or not whole:
+        search = _Search.of(self)
+        if whole:
+            search.end(readings[0])
+            if search.settled and self.enough < QUICK:
+                search.exact(self)
+                search.end(readings[0])
+            settled = search.settled
+        else:
+            for n, most in enumerate(readings):
+                before = search.best[0].part
+                search.go(most)
+                if search.settled or (n and search.best[0].part < before + ONWARDS):
+                    break
+            settled = search.settled
             search.land(readings[0])
             if self.enough < QUICK:
                 search.refine(self, readings[0])
@@ -334,19 +341,21 @@ class _Correction:
     def fitted(cls, space: Space, read: Sequence[_Read], at: _Read) -> _Correction:
         """The correction at one of the points that were read, its slopes by those at the others.
 
-        Slopes are the likeliest where they are about 1, and where a difference that is read at a distance is off what
-        they give by about `BENT` times its square.
+        Slopes are the likeliest where they are about 1, or 0 by coordinates that a reading does not follow, and where a
+        difference that is read at a distance is off what they give by about `BENT` times its square.
         """
         here = cls.none(space, at.x)
         here = dataclasses.replace(here, value=here._difference(at))
         steps = np.array([here._step(each.x) for each in read if each is not at]).reshape(-1, len(at.x))
         gains = np.array([here._difference(each) - here.value for each in read if each is not at])
-        far = np.linalg.norm(steps, axis=1)
-        apart = far > 0
-        weights = 1 / (BENT * far[apart, None] ** 2 + ROUNDED)
-        rows, right = weights * steps[apart], weights * gains.reshape(-1, len(here.value))[apart]
-        slopes = rows.T @ np.linalg.solve(rows @ rows.T + np.eye(len(rows)), right)
-        return dataclasses.replace(here, slopes=slopes.T)
+        gains, slopes = gains.reshape(-1, len(here.value)), np.empty_like(here.slopes)
+        each, which = np.unique(space.followed, axis=0, return_inverse=True)
+        for n, followed in enumerate(each):
+            own, rows = np.ravel(which) == n, followed * steps
+            weights = 1 / (BENT * np.linalg.norm(rows, axis=1)[:, None] ** 2 + ROUNDED)
+            rows, right = weights * rows, weights * gains[:, own]
+            slopes[own] = (rows.T @ np.linalg.solve(rows @ rows.T + np.eye(len(rows)), right)).T
+        return dataclasses.replace(here, slopes=slopes)
 
     def _difference(self, read: _Read) -> Array:
         return _seen(read.value, self.least, self.blurs) - _seen(read.near, self.least, self.blurs)
@@ -361,7 +370,8 @@ class _Search:
 
     All of the way is aimed at first. Where that leads astray, the search goes back to the last point near the line, and
     aims at a part of the way: by how far it got, then on from there, in steps like the last ones. In the end it leads
-    back to the line. All of this is the same for all answers; for an exact one, the search goes on from there.
+    back to the line. All of this is the same for all answers; for an exact one, the search goes on from there. Where
+    only the end of the line counts, the search is another one (`end`), which does not keep to the line.
 
     read: the points that corrections follow from. seen: all points so far, and where they are. base: the last point
     near the line. aim: part of the way. step: the length of steps. last: what was missed before, infinite of a new aim.
@@ -370,7 +380,6 @@ class _Search:
     """
 
     line: Line
-    whole: bool
     read: list[_Read]
     seen: list[tuple[Reached, _Read]]
     base: tuple[Reached, _Read]
@@ -384,7 +393,7 @@ class _Search:
     lower: float = LOWER
 
     @classmethod
-    def of(cls, line: Line, whole: bool) -> _Search:
+    def of(cls, line: Line) -> _Search:
         """The search from the start of a line."""
         space, x, exact = line.start.space, line.start.x, line.start.reading.value
         value = rounded(exact, DIGITS)
@@ -392,7 +401,7 @@ class _Search:
         origin, goal = rounded(line.origin, DIGITS), rounded(line.goal, DIGITS)
         line = dataclasses.replace(line, enough=max(line.enough, QUICK), origin=origin, goal=goal)
         begun = line._reached(x, value), first
-        return cls(line, whole, [first], [begun], begun, _Correction.fitted(space, [first], first))
+        return cls(line, [first], [begun], begun, _Correction.fitted(space, [first], first))
 
     @property
     def best(self) -> tuple[Reached, _Read]:
@@ -421,14 +430,44 @@ class _Search:
 
     def refine(self, line: Line, readings: int) -> None:
         """Read at most so many points more, until they miss no more than the line allows."""
-        missed, self.line = self.line.enough, line
-        self.read = [each.unrounded for each in self.read]
-        self.seen = [(at, each.unrounded) for at, each in self.seen]
+        missed = self.line.enough
+        self.exact(line)
         if self._ended:
             self._aimed(self.seen[-1][1], self.aim, missed)
         else:
             self._landed(self.best)
         self._led(readings)
+
+    def end(self, readings: int) -> None:
+        """Read at most so many points that lead to the end of the line, each from the nearest one so far: none that is
+        not expected to be much nearer, and few that are not nearer."""
+
+        line, counted = self.line, self.line.start.space.counted
+
+        def missed(value: Array) -> float:
+            return float(np.abs((value - line.goal) / line._scale)[counted].max())
+
+        for left in range(readings, -1, -1):
+            nearest = min(self.read, key=lambda read: missed(read.value))
+            far = missed(nearest.value)
+            self.settled = far < line.enough
+            if self.settled or not left or all(nearest is not each for each in self.read[-PATIENCE:]):
+                return
+            self._aimed(nearest, 1.0, far)
+            # What is kept stays where it is, or else as it was at first: either may lead nowhere
+            for kept in (nearest.x, line.start.x):
+                x, near, expected = self._tried(kept)
+                if missed(expected) <= max(line.enough, HOPE * far):
+                    self._read(x, near)
+                    break
+            else:
+                return
+
+    def exact(self, line: Line) -> None:
+        """Go on by exact readings, as exactly as the line asks for."""
+        self.line = line
+        self.read = [each.unrounded for each in self.read]
+        self.seen = [(at, each.unrounded) for at, each in self.seen]
 
     @property
     def _ended(self) -> bool:
@@ -454,43 +493,60 @@ class _Search:
         self.correction = _Correction.fitted(self.line.start.space, self.read, at)
         self.aim, self.last = min(1.0, part), last
 
+    def _tried(self, kept: Array) -> tuple[Array, Array, Array]:
+        """The next point, its reading without correction, rounded, and the reading that is expected. kept: the point
+        whose coordinates are kept."""
+        space = self.line.start.space
+        line = dataclasses.replace(self.line._aimed(self.aim), start=Point(space, kept))
+        x, near = line._followed(space.quickly, self.correction.x, self.correction, self._nearly)
+        x, near = rounded(x, KNOWN), rounded(near, KNOWN)
+        return x, near, self.correction.value_of(x, near)
+
+    @property
+    def _nearly(self) -> float:
+        """The most that the corrected model may miss."""
+        return min(max(INNER * self.last, NEARLY * self.line.enough), COARSE)
+
+    def _read(self, x: Array, near: Array) -> tuple[Reached, _Read]:
+        """Read a point."""
+        exact = self.line.start.space.read(x[:, None])[:, 0]
+        value = exact if self.line.enough < QUICK else rounded(exact, DIGITS)
+        now = _Read(x, value, exact, near)
+        self.read.append(now)
+        self.seen.append((self.line._reached(x, value), now))
+        return self.seen[-1]
+
     def _ends(self) -> bool:
         """Read one more point; whether the search ends there."""
         line, enough = self.line, self.line.enough
-        nearly = min(max(INNER * self.last, NEARLY * enough), COARSE)
-        x, near = line._aimed(self.aim)._followed(line.start.space.quickly, self.correction.x, self.correction, nearly)
-        x, near = rounded(x, KNOWN), rounded(near, KNOWN)
-        exact, expected = line.start.space.read(x[:, None])[:, 0], self.correction.value_of(x, near)
-        value = exact if enough < QUICK else rounded(exact, DIGITS)
-        now, missed, hoped = _Read(x, value, exact, near), line._apart(value, expected), line.placed(expected)[0]
-        there = line._reached(x, value)
-        self.read.append(now)
-        self.seen.append((there, now))
+        x, near, expected = self._tried(line.start.x)
+        there, now = self._read(x, near)
+        missed, hoped = line._apart(now.value, expected), line.placed(expected)[0]
         astray = missed > (ASTRAY if self.last == np.inf else max(FOLLOWED, SLOWLY * self.last))
-        self.settled = max(missed, nearly) < enough and (self.aim == 1 or abs(hoped - self.aim) > enough)
+        self.settled = max(missed, self._nearly) < enough and (self.aim == 1 or abs(hoped - self.aim) > enough)
         if self.settled and there.off > self.line.allowed:
-            if not (self.stuck or self.whole):
+            if not self.stuck:
                 self.stuck, self.read = True, [now]
                 self._aimed(now, self.aim)
                 return False
             self.settled, astray = False, not self.landing
         if self.settled or (self.landing and there.off < enough):
             return True
-        if self.whole and (astray or (missed < NEAR and hoped < 1 - FOLLOWED)):
-            return True
-        self._turned(now, there, missed, astray)
-        return False
+        return not self._turned(now, there, missed, astray)
 
-    def _turned(self, now: _Read, there: Reached, missed: float, astray: bool) -> None:
-        """Aim at the next part of the way, or at the same again."""
+    def _turned(self, now: _Read, there: Reached, missed: float, astray: bool) -> bool:
+        """Aim at the next part of the way, or at the same again; whether there is any: no way leads back to the line
+        where that does not get nearer to its beginning."""
         base = self.base[0]
         gone, far = there.part - base.part, self.aim - base.part
         if self.landing:
             if there.off < max(self.line.allowed, self.last):
                 self._aimed(now, self.aim, there.off)
-            else:
+            elif self.aim > self.lower:
                 self._aimed(self.base[1], self.aim - self.lower)
                 self.lower *= 2
+            else:
+                return False
         elif astray:
             self.step = BACK * gone if SEEN < gone < far else far / 4
             self._stepped()
@@ -500,6 +556,7 @@ class _Search:
             self._stepped()
         else:
             self._aimed(now, self.aim, missed)
+        return True
 
     def _stepped(self) -> None:
         """Aim one step further than the base."""
