@@ -247,6 +247,6 @@ def test_light_that_coats_throw_back_is_apart_for_long_facets_alone() -> None:
             [part for part in found(Interface(eta=eta, alpha=coat), metal) if isinstance(part, Facets)]
         )
 
-    assert apart(eta=1.0) == apart(across=0.2) == apart(across=0.17) == apart(k=None) == 0
-    assert 0 < apart(across=0.13) < apart(across=0.1) < apart() < 1
+    assert apart(eta=1.0) == apart(across=0.2) == apart(k=None) == 0
+    assert 0 < apart(across=0.17) < apart(across=0.13) < apart(across=0.1) < apart() < 1
     assert 0 < apart(coat=(0.02, 0.2)) < 0.1 * apart() < apart(coat=(0.2, 0.02))

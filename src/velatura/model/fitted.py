@@ -31,7 +31,7 @@ STEEPNESS = (9.0, 1.2)
 OWN_STEEPNESS = (0.53, 1.5)
 # Likewise of the cosine at which light that leaves meets brushed facets, and those of coats above a brushed metal
 LEAVING_STEEPNESS = 3.0, 2.0
-LONG = 0.2, 0.6  # 1 - alpha_min / alpha_max from which facets of a metal count as long, and as a whole
+LONG = 0.6  # 1 - alpha_min / alpha_max from which facets of a metal count as long as a whole
 SLIGHT_STEP = 0.2  # step of the index over the greatest one, that does not count
 CORRECTION_MAX = 1.5  # logarithm of a correction
 CORRECTION_FADE = 0.1  # sum of steps of the logarithm of the index below which corrections fade

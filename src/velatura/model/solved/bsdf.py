@@ -65,7 +65,8 @@ class Shape:
 
     def lobe(self, weight: Value, roughness: Roughness) -> RefractedLobe:
         reflect = self.facets.reflect_together if self.facets else None
-        return RefractedLobe(weight, roughness, self.n, reflect, self._leaving if self.first else None)
+        leaving, grazing = self._leaving if self.first else None, self.steeper is not None
+        return RefractedLobe(weight, roughness, self.n, reflect, leaving, grazing)
 
     def _leaving(self, cosine: Value) -> Value:
         assert self.first

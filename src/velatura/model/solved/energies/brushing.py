@@ -35,8 +35,7 @@ def thrown_back(facets: Sequence[Facets]) -> float:
 
 def long(brushed: Value) -> Value:
     """How far facets count as long, from 0 to 1, by 1 - alpha_min / alpha_max; in any dialect."""
-    begin, whole = fitted.LONG
-    return ops.clip((brushed - begin) * (1 / (whole - begin)), 0.0, 1.0)
+    return ops.minimum(brushed * (1 / fitted.LONG), 1.0)
 
 
 def _stepped(coat: Facets) -> float:

@@ -35,6 +35,7 @@ Array = NDArray[np.floating]
 
 NORMALS = 987  # of the quadrature's lattice; a Fibonacci number
 SPARSE = 3  # of so many normals one, for weights
+HORIZON = 0.2  # squares of momenta, over roughness and the index, across which samples of an integral fade
 
 Reflectance = Callable[[Value], Value]
 
@@ -80,8 +81,9 @@ class RefractedLobe(ops.NamedFields):
     `MediumIndex`, refracted out.
 
     `facets` is the Fresnel reflectance of the facets by the square of a cosine, and `leaving` the share of light at a
-    cosine outside that the first interface lets out; None where the weight has all of it, or nothing lies above. With
-    the energy over the `integral` as weight, the lobe has that energy.
+    cosine outside that the first interface lets out; None where the weight has all of it, or nothing lies above.
+    `grazing`: whether it lets any out along the horizon. With the energy over the `integral` as weight, the lobe has
+    that energy.
     """
 
     weight: Value
@@ -89,6 +91,7 @@ class RefractedLobe(ops.NamedFields):
     n: Value = 1.0
     facets: Reflectance | None = None
     leaving: Reflectance | None = None
+    grazing: bool = False
 
 
 def eval_pdf(lobe: RefractedLobe, wi: Direction, wo: Direction) -> tuple[Value, Value]:
@@ -212,14 +215,15 @@ def _split(lobe: RefractedLobe, wi: Direction) -> tuple[list[Array], list[Any]]:
     """Numbers of each direction, and those of a lobe for all."""
     numbers = [*wi, *lobe.roughness]
     varying = [x for x in numbers if np.ndim(x)]
-    return varying, [[None if np.ndim(x) else x for x in numbers], MediumIndex.of(lobe.n), lobe.facets, lobe.leaving]
+    fixed = [None if np.ndim(x) else x for x in numbers]
+    return varying, [fixed, MediumIndex.of(lobe.n), lobe.facets, lobe.leaving, lobe.grazing]
 
 
 def _joined(directions: Sequence[Value], numbers: Any) -> tuple[RefractedLobe, Direction]:
-    fixed, n, facets, leaving = numbers
+    fixed, n, facets, leaving, grazing = numbers
     varying = iter(directions)
     x, y, z, *roughness = (next(varying) if value is None else value for value in fixed)
-    return RefractedLobe(1.0, Roughness(*roughness), n, facets, leaving), (x, y, z)
+    return RefractedLobe(1.0, Roughness(*roughness), n, facets, leaving, grazing), (x, y, z)
 
 
 def _values(directions: Sequence[Value], lattice: Sequence[Value], numbers: Any) -> Found:
@@ -254,12 +258,18 @@ def _sampled(lobe: RefractedLobe, wi: Direction, u1: Value, u2: Value) -> tuple[
     h = ggx.sample_visible(i, alpha_u, alpha_v, u1 + ops.arctan2(i[1], i[0]) * (0.5 / pi), u2)
     o = ggx.reflect(i, h)
     p2 = o[0] * o[0] + o[1] * o[1]
-    value = ops.select(p2 < 1, ggx.masking(o, alpha_u, alpha_v), 0.0)
+    if lobe.grazing:
+        # Samples about the horizon count in part, as much less above it as more below, so that none jumps
+        inside = ops.clip(0.5 + (1 - p2) / (HORIZON * n.n * ops.maximum(alpha_u, alpha_v)), 0.0, 1.0)
+        above = ops.absolute(1 - p2)
+    else:
+        inside, above = ops.select(p2 < 1, 1.0, 0.0), 1 - p2
+    value = inside * ggx.masking(o, alpha_u, alpha_v)
     if lobe.facets:
         cosine = ops.clip(ggx.dot(i, h) * n.inverse, 0.0, 1.0)
         value = value * _flat(lobe.facets, cosine * cosine)
     if lobe.leaving:
-        value = value * _flat(lobe.leaving, ops.sqrt(1 - p2))
+        value = value * _flat(lobe.leaving, ops.sqrt(above))
     return value, i, o
 
 

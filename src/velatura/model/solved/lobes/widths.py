@@ -420,7 +420,9 @@ def steeper(alpha_u: Value, alpha_v: Value, of_metal: tuple[Value, Value] | None
 
 
 def _brushing(alpha_u: Value, alpha_v: Value) -> Value:
-    return 1 - ops.divide(ops.minimum(alpha_u, alpha_v), ops.maximum(alpha_u, alpha_v))
+    """As `Facets.brushed`."""
+    low, high = ops.minimum(alpha_u, alpha_v), ops.maximum(alpha_u, alpha_v)
+    return 1 - ops.maximum(low, ALPHA_MIN) / ops.maximum(high, ALPHA_MIN)
 
 
 def veil(found: Sequence[Part], k: int, cos_theta: Array, tensor: Tensor) -> Tensor:
