@@ -110,7 +110,8 @@ def test_the_energy_plot_tells_the_energies_of_the_model(visit: Look, model: str
 
 
 def test_the_blur_plot_tells_the_roughnesses_of_the_model(visit: Look) -> None:
-    """Within .001 of the texture that shaders read, and the rounding of three digits; of a lobe that is two, those of the first."""
+    """Within .001 of the texture that shaders read, and the rounding of three digits; those of the first part of a lobe
+    that is two."""
     tab(visit, "Blur")
     aim(visit, "angle", 60)
     material, cosine, phi = Material.of(vt.preset(PRESET)), np.array([0.5]), np.zeros(1)
