@@ -116,7 +116,7 @@ def lobe_of(facets: Sequence[Facets], k: int, roughness: Roughness) -> Refracted
 
     first = widths.first_step([each.step for each in facets[:k]])
     n, last = float(np.mean(facets[k].above)), facets[-1]
-    of_metal = (last.alpha_u, last.alpha_v) if last.opaque and last.brushed else None
+    of_metal = (last.alpha_u, last.alpha_v) if facets[k] is last and last.opaque and last.brushed else None
     if first is None:
         return RefractedLobe(1.0, roughness, n, reflected)
     return RefractedLobe(1.0, roughness, n, None if facets[k].opaque else reflected, leaving)

@@ -874,12 +874,16 @@ def shapes_of(material: Material, drawn: Sequence[LobeSpec]) -> list[Shape]:
     alphas = [(layer.alpha_u, layer.alpha_v) for layer in material.interfaces]
     opaque = [each for layer, each in zip(material.interfaces, alphas) if layer.kind != "dielectric"]
     of_metal = next((each for each in opaque if not is_same(*each)), None)
-    steeper = [widths.steeper(u, v, of_metal) if of_metal or not is_same(u, v) else None for u, v in alphas]
+
+    def steeper(coat: int, interface: int) -> Value | None:
+        metal, alpha = of_metal if interface == len(alphas) - 1 else None, alphas[coat]
+        return widths.steeper(*alpha, metal) if metal or not is_same(*alpha) else None
+
     shapes = []
     for lobe in drawn:
         own, k = found[lobe.interface], lobe.first
         facets = own if k is None or not own.opaque else None
-        out = (indices[0], None) if k is None else (indices[k], found[k], steeper[k])
+        out = (indices[0], None) if k is None else (indices[k], found[k], steeper(k, lobe.interface))
         n = replace(indices[lobe.interface], denser=lobe.denser, edged=lobe.edged)
         shapes.append(Shape(lobe.interface, n, facets, *out))
     return shapes

@@ -35,7 +35,7 @@ Array = NDArray[np.floating]
 
 NORMALS = 987  # of the quadrature's lattice; a Fibonacci number
 SPARSE = 3  # of so many normals one, for weights
-HORIZON = 0.2  # squares of momenta, over roughness and the index, across which samples of an integral fade
+HORIZON = 0.05  # squares of momenta, over roughness and the index, across which samples of an integral fade
 
 Reflectance = Callable[[Value], Value]
 

@@ -420,7 +420,7 @@ def steeper(alpha_u: Value, alpha_v: Value, of_metal: tuple[Value, Value] | None
 
 
 def _brushing(alpha_u: Value, alpha_v: Value) -> Value:
-    """As `Facets.brushed`."""
+    """Difference of two roughnesses as a share of the larger, as `Facets.brushed`."""
     low, high = ops.minimum(alpha_u, alpha_v), ops.maximum(alpha_u, alpha_v)
     return 1 - ops.maximum(low, ALPHA_MIN) / ops.maximum(high, ALPHA_MIN)
 
