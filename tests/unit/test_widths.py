@@ -205,7 +205,7 @@ def test_light_of_brushed_metals_goes_where_walks_go(name: str) -> None:
     """Total variation over 20 x 20 bins, of which walks make .01; .079 and .057 below isotropic coats with
     one lobe of the metal, and .068 and .069 below crossed ones."""
     kernel.require_llvm()
-    stack, bins, cosine, phi = Stack(PARTED[name]), 20, 0.5, 0.28
+    stack, bins, cosine, phi = Stack(PARTED[name]), 20, 0.5, 0.2
     truth = vt.reference.distribution(stack, cosine, phi, 200_000, 1, True, bins=bins).reflected.mean(axis=(0, 1))
     fine = 8
     axis = (np.arange(bins * fine) + 0.5) / (0.5 * bins * fine) - 1
@@ -218,10 +218,10 @@ def test_light_of_brushed_metals_goes_where_walks_go(name: str) -> None:
     light = np.zeros(len(up))
     light[up] = np.mean(value, axis=0) / wo[2] / (0.5 * bins * fine) ** 2
     light = light.reshape(bins, fine, bins, fine).sum(axis=(1, 3))
-    # Beside the mirror direction, where light of a smooth coat is narrower than these points
-    middle = (np.arange(bins) + 0.5) / (0.5 * bins) - 1
-    beside = np.hypot(middle[:, None] + wi[0], middle + wi[1]) > 0.12
-    assert 0.5 * np.abs(light - truth)[beside].sum() < ASTRAY[name] * truth[beside].sum()
+    if name == "a smooth coat":  # whose mirrored light is narrower than these points
+        middle = (np.arange(bins) + 0.5) / (0.5 * bins) - 1
+        light, truth = (x * (np.hypot(middle[:, None] + wi[0], middle + wi[1]) > 0.12) for x in (light, truth))
+    assert 0.5 * np.abs(light - truth).sum() < ASTRAY[name] * truth.sum()
 
 
 def test_lobes_are_parted_as_far_as_facets_cross() -> None:

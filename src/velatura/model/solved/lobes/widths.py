@@ -258,14 +258,16 @@ def each(found: Sequence[Part], cos_theta: Array, phi: Array, energies: Array) -
 
 
 def _first_order(own: Tensor, coats: Sequence[_Coat], n: float, cosine: Array) -> Tensor:
-    moved = [coat.moved for coat in coats]
-
     def total(x: Array, y: Array) -> Tensor:
-        both_ways = [each.stretched(0.5 / (n * x), 0.5 / (n * y)) for each in moved] * 2
-        return _sum([own, *both_ways])  # model.md, Eq. 6
+        return _sum([own, *_both_ways(coats, n * x, n * y)])  # model.md, Eq. 6
 
     simple = total(cosine, cosine)
     return total(*(np.sqrt(cos2) for cos2 in _steeper(cosine, np.sqrt(simple.xx), fitted.OWN_STEEPNESS)))
+
+
+def _both_ways(coats: Sequence[_Coat], x: Array, y: Array) -> list[Tensor]:
+    """Tensors of what coats add on the way in and out, of a lobe whose facets move momentum by 2 x and 2 y."""
+    return [coat.moved.stretched(0.5 / x, 0.5 / y) for coat in coats] * 2
 
 
 def _turned_aside(first: Tensor, coats: Sequence[_Coat], n: float, cosine: Array) -> Tensor:
@@ -383,8 +385,7 @@ def _again(own: Tensor, coats: Sequence[_Coat], n: float, cosine: Array) -> Tens
     steps = np.array([coat.facets.step for coat in coats])
     shares = (steps / max(steps.sum(), LEAST_STEP)) ** (1 / fitted.Q)
     met = [coat.tensor.stretched(share, share) for coat, share in zip(coats, shares)]
-    both_ways = [coat.moved.stretched(0.5 / (n * cosine), 0.5 / (n * cosine)) for coat in coats] * 2
-    return _sum([own, own, *met, *both_ways])
+    return _sum([own, own, *met, *_both_ways(coats, n * cosine, n * cosine)])
 
 
 def _by_order(
