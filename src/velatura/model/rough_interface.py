@@ -106,8 +106,8 @@ class Facets:
 
     @property
     def brushed(self) -> float:
-        """0 for isotropic facets, towards 1 for those that are long along an axis."""
-        return 1 - 1 / self.ratio
+        """How long facets are along an axis, from 0 towards 1."""
+        return float(brushed(self.alpha_u, self.alpha_v))
 
     @property
     def across(self) -> float:
@@ -448,6 +448,12 @@ def _reflected_twice(
     comes = ops.select(up, b / (a + b), 1.0)
     leaves = ops.select(second[2] > 0, a / (a + c) * ops.select(up, 1.0, (1 + b) / (1 + b + c)), 0.0)
     return comes, leaves
+
+
+def brushed(alpha_u: Value, alpha_v: Value) -> Value:
+    """0 for facets of equal roughnesses, towards 1 for those that are long along an axis, in any dialect."""
+    low, high = ops.minimum(alpha_u, alpha_v), ops.maximum(alpha_u, alpha_v)
+    return 1 - ops.maximum(low, ALPHA_MIN) / ops.maximum(high, ALPHA_MIN)
 
 
 def mean_alpha(facets: Facets) -> float:

@@ -32,7 +32,7 @@ from numpy.typing import NDArray
 from velatura import ops
 from velatura.model import fitted
 from velatura.model.guards import ALPHA_MIN
-from velatura.model.rough_interface import Facets
+from velatura.model.rough_interface import Facets, brushed
 from velatura.model.solved.energies.adding import Part
 from velatura.model.solved.energies.brushing import crossing, long, thrown_back
 from velatura.model.solved.energies.media import Slab
@@ -414,16 +414,10 @@ def steeper(alpha_u: Value, alpha_v: Value, of_metal: tuple[Value, Value] | None
     """Share of sin^2 by which the square of the cosine grows at which light that leaves meets facets that are brushed,
     or above a brushed metal of roughnesses `of_metal`, in any dialect."""
     of_own, of_others = fitted.LEAVING_STEEPNESS
-    steepness = of_own * _brushing(alpha_u, alpha_v)
+    steepness = of_own * brushed(alpha_u, alpha_v)
     if of_metal:
-        steepness = ops.maximum(steepness, of_others * long(_brushing(*of_metal)))
+        steepness = ops.maximum(steepness, of_others * long(brushed(*of_metal)))
     return ops.minimum(0.5 * steepness * (alpha_u * alpha_u + alpha_v * alpha_v), 1.0)
-
-
-def _brushing(alpha_u: Value, alpha_v: Value) -> Value:
-    """Difference of two roughnesses as a share of the larger, as `Facets.brushed`."""
-    low, high = ops.minimum(alpha_u, alpha_v), ops.maximum(alpha_u, alpha_v)
-    return 1 - ops.maximum(low, ALPHA_MIN) / ops.maximum(high, ALPHA_MIN)
 
 
 def veil(found: Sequence[Part], k: int, cos_theta: Array, tensor: Tensor) -> Tensor:
