@@ -34,3 +34,12 @@ def test_shares_keep_samples_light_as_far_as_they_suffice(usual: list[float], he
 
 def test_a_part_of_hardly_any_energy_takes_few_samples() -> None:
     assert shared(wanted([0.8, 1e-5], [0.8, 2.0], [0.8, 2.0]))[1, 0] < 0.01
+
+
+def test_shares_do_not_jump_where_samples_become_heavier() -> None:
+    """Light of some samples is cut off by their density, and so jumped with their shares."""
+    heaviest = np.linspace(1.2, 4.0, 3001)
+    numbers = [0.3, 0.1, 0.1], [0.9, 1.1, 0.1], [1.5, heaviest, 0.3]
+    found = shared(Demand(*(np.array(np.broadcast_arrays(*each, heaviest)[:3]) for each in numbers)))
+    assert np.ptp(found[1]) > 0.01
+    assert np.abs(np.diff(found)).max() < 2e-4

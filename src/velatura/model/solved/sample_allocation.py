@@ -67,11 +67,14 @@ def shared(demand: Demand) -> Array:
         weight = usual + part * np.maximum(heaviest - usual, 0)
         return np.maximum(KEPT * even, counts * weight)
 
-    part, step = np.ones_like(energy[0]), 0.5
+    # Halve to where all samples are asked for, and interpolate there, so that shares do not jump
+    low, high = np.zeros_like(energy[0]), np.ones_like(energy[0])
     for _ in range(STEPS):
-        part = part + np.where(least(part).sum(axis=0) > 1, -step, step)
-        part, step = np.clip(part, 0, 1), 0.5 * step
-    found = least(part)
+        middle = 0.5 * (low + high)
+        beyond = least(middle).sum(axis=0) > 1
+        low, high = np.where(beyond, low, middle), np.where(beyond, middle, high)
+    at_low, at_high = (least(end).sum(axis=0) for end in (low, high))
+    found = least(low + (high - low) * np.clip(ops.divide(1 - at_low, at_high - at_low), 0, 1))
     found = found / np.maximum(found.sum(axis=0), 1)
     raised = np.zeros(energy.shape, bool)
     for _ in range(len(energy)):
