@@ -8,7 +8,7 @@ roughnesses, and the bound under the hand must lie within 2 % of the way of that
 that does not meet its wish, stacks are drawn within the bounds, by their coordinates: none that lies near the line to
 the wish may lead to one on the line that is nearer by 2 %. A model that reads one stack at a time reads few of them:
 those that the nearest model in closed form, scaled to read the answer alike, sees within `WIDER` times those margins,
-and of these the `READ` furthest. Times are of the processor.
+and of these the `READ` furthest. Times are of the processor. Every `SAID` wishes a line counts those so far.
 """
 
 from __future__ import annotations
@@ -37,6 +37,7 @@ WIDER, READ = 4.0, 40  # of margins for stacks that are known roughly, and the m
 CHANGE, BEYOND = 1.5, 3.0  # of wishes: the most, as a logarithm
 BRIGHTEST, ROUGHEST = 0.95, 0.9
 SPREAD = (1e-3, 1.0)  # of stacks that are drawn, in units of coordinates
+SAID = 10
 
 
 def wishes(model: Model, seed: int, beyond: bool = False) -> Iterator[tuple[DraggedStack, Target]]:
@@ -138,7 +139,7 @@ def main() -> int:
     seconds: dict[str, list[float]] = {"rest": [], "hand": []}
     met = alike = 0
     found = islice(answered(model, options.seed, options.beyond, seconds), options.wishes)
-    for present, wish, answers in counted(found, options.wishes, "wishes"):
+    for done, (present, wish, answers) in enumerate(counted(found, options.wishes, "wishes"), 1):
         rest, hand = answers["rest"], answers["hand"]
         met += rest.met
         others = [by_invert(present, wish, model), hand.reached]
@@ -149,9 +150,11 @@ def main() -> int:
             failed += 1
             print(
                 f"{apart:.1e} apart, {further:.3f} further than {rest.part:.3f} ({rest.why}), {hand.part:.3f} under "
-                f"the hand: {wish.to_dict()['lobes']}",
+                f"the hand: {wish.to_dict()['lobes']} from {present.stack.to_dict()}",
                 flush=True,
             )
+        if done % SAID == 0:
+            print(f"{done} wishes: {alike} alike under the hand, {met} met, {failed} failed", flush=True)
     for way, taken in seconds.items():
         row("nearest", way, taken, remark=f"95 % below {np.quantile(taken, 0.95):.2f}, at most {max(taken):.2f} s")
     print(f"{options.model}: {alike} of {options.wishes} answers under the hand have the lobes of that at rest")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from typing import Any
 
 import numpy as np
@@ -148,6 +149,36 @@ def test_a_search_ends_where_nothing_leads_back_to_the_line(monkeypatch: pytest.
     monkeypatch.setattr(Space, "_solved", beside)
     found = Line(present.point, here, goal).last(READINGS)
     assert found.part == 0 and 0 < len(read) < READINGS[0]
+
+
+def test_readings_that_jump_lead_to_no_number_too_large(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Readings of the closed form, a tenth more and less by turns: of points close together, they say that energies
+    follow steeply. Expected: an answer on the line, of finite indices, and no overflow."""
+    model, readings = named("velatura"), itertools.count()
+    now = seen(METAL, Target([{"energy": 0.1}, {"energy": 0.1, "base": "conductor"}]), model)
+    wish = now.with_energy(0, (0.001,) * 3)
+
+    def jumping(space: Space, x: Any) -> Any:
+        return space.quickly.read(x)[:, 0] * (1.1 if next(readings) % 2 else 0.9)
+
+    monkeypatch.setattr(Space, "_solved", jumping)
+    with np.errstate(over="raise", divide="raise", invalid="raise"):
+        found = answer(METAL, wish, model)
+    assert 0 <= found.part <= 1 and np.isfinite(found.stack.point.x).all()
+
+
+def test_a_lobe_that_stays_smooth_is_followed_at_once(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A smooth pair that is wished four times as bright. The least blur would be read as one of .001.
+
+    Expected: the wish, by fewer readings than one search may take, and interfaces that are smooth.
+    """
+    model, read, readings = named("velatura"), Space._solved, itertools.count()
+    pair = Stack([vt.Interface(eta=1.4595), vt.Medium(sigma_a=(0.0223, 0.021, 0.0)), vt.Interface(eta=2.05)])
+    now = seen(pair, Target([{"energy": 0.1, "interfaces": 2}]), model)
+    monkeypatch.setattr(Space, "_solved", lambda *where: (next(readings), read(*where))[1])
+    found = answer(pair, now.with_energy(0, 3.92 * np.array(now.lobes[0].colour)), model)
+    assert found.met and next(readings) < 8
+    assert [layer.alpha for layer in found.stack.stack.interfaces] == [0.0, 0.0]
 
 
 def test_a_refusal_of_a_wish_from_a_material_offers_the_nearest_answer_first() -> None:

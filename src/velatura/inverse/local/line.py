@@ -16,7 +16,7 @@ import numpy as np
 from velatura import ops
 from velatura.inverse.lobes.partial_stack import Array, Mask
 from velatura.inverse.local.approach import FURTHER, LITTLE, step_within
-from velatura.inverse.local.coordinates import SLACK, Bound, Point, Reading, Space, rounded, units
+from velatura.inverse.local.coordinates import SLACK, SMOOTH, Bound, Point, Reading, Space, rounded, units
 
 ALONG = (1.0, 1e-4)  # weights of the way along the line, beside 1 of what leads off it: at first, and in the end
 ROUNDS, CLOSE = 16, 1e-3  # of steps, and the shortest
@@ -34,7 +34,7 @@ SLOWLY, NEAR = 0.7, 0.015  # the share of the last miss that is no progress, and
 SEEN, BACK = 0.03, 0.7  # of the way that is gone astray: the least that counts, and the share to go
 FURTHER_ON, ONWARDS, SHORT = 2.0, 0.02, 2e-3  # steps along the line: by an easy last one, anew, and the least
 LANDING, LOWER = 4, 0.01  # readings that lead back to the line, and by how much less is aimed at first if they do not
-FOLDED = 1 - 1e-3  # the largest variance, folded, that a correction leads to
+BRIGHTEST, FOLDED = 1.0, 1 - 1e-3  # the largest energy, and variance, folded, that a correction leads to
 DIGITS, KNOWN = 7, 9  # of readings of a slow model, and of all else that the search goes on with
 BENT = 0.5  # by how much corrections are off their slopes, as a share of the square of a distance
 ROUNDED = 10**-DIGITS  # the same, at least
@@ -131,8 +131,8 @@ class Line:
         Coordinates that are kept move only where the others do not meet the goal.
         """
         box = space.box
-        held = np.array(list(self.held), int)
-        every, free = np.setdiff1d(np.arange(len(x)), held), np.setdiff1d(space.free, [*held, *self._resting])
+        every = self._moving
+        free = np.setdiff1d(np.intersect1d(space.free, every), self._resting)
         kept = np.clip(self.start.x, *box)
         kept[free] = x[free]
         ends = list[tuple[Array, float, Array]]()
@@ -209,7 +209,7 @@ class Line:
     def _bound(self, x: Array, correction: _Correction) -> Bound:
         """The bound that keeps a point from going further: the one that it would leave with the steepest gain."""
         space = self.start.space
-        free = np.setdiff1d(np.arange(len(x)), np.array(list(self.held), int))
+        free = self._moving
         reading = correction.of(x, space.quickly.reading(x, free), free)
         rows = self._rows(ALONG[-1])
         gain = np.zeros(len(x))
@@ -230,6 +230,19 @@ class Line:
             return max(own or steep, key=lambda each: each[0])[1]
         counted = space.counted
         return space.unmet(int(counted[np.argmax(np.abs(self._way[counted]))]))
+
+    @cached_property
+    def _moving(self) -> Array:
+        """Coordinates that may move: none that is held, nor blurs above a lobe that is smooth all along the way.
+
+        The least of these would blur it: a model reads facets as rough as those that it draws, at least.
+        """
+        space, x = self.start.space, self.start.x
+        read = np.abs([self.origin, self.goal])[:, 3 * space.lobes :].reshape(2, len(space.interfaces), -1)
+        smooth = np.flatnonzero(read.max(axis=(0, 2)) < SMOOTH)
+        above = [own.variance for own in space.interfaces[: smooth.max(initial=-1) + 1]]
+        blurs = [n for span in above for n in range(span.start, span.stop) if np.abs(x[span]).max() < SMOOTH]
+        return np.setdiff1d(np.arange(len(x)), np.array([*self.held, *blurs], int))
 
     @cached_property
     def _resting(self) -> list[int]:
@@ -326,9 +339,10 @@ class _Correction:
     def value_of(self, x: Array, near: Array) -> Array:
         """The reading `near` at a point, corrected."""
         more = _seen(near, self.least, self.blurs) + self.value + self.slopes @ self._step(x)
-        found = self.least * np.expm1(np.abs(more))
-        folded = np.minimum(found, FOLDED)
-        return np.asarray(np.sign(more) * np.where(self.blurs, folded / (1 - folded), found))
+        # Where readings jump between points close together, slopes are steep, and no exponential may overflow
+        most = np.log1p(np.where(self.blurs, FOLDED, BRIGHTEST) / self.least)
+        found = self.least * np.expm1(np.minimum(np.abs(more), most))
+        return np.asarray(np.sign(more) * found / (1 - self.blurs * found))
 
     def of(self, x: Array, near: Reading, free: Array) -> Reading:
         """A reading, corrected."""
