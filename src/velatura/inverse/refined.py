@@ -43,6 +43,7 @@ TRIES, OWN, FEWER = 6, 4, 4  # stacks that are begun with; those that have the l
 HOPELESS = 0.5  # share of what is asked that the first of these misses, where none has and no other one follows
 PARTS = (1.0, 0.5, 0.25)  # of a correction, where all of it has no stack
 FOLLOWED, EXACT = 12, 2e-7  # readings of a search that follows the closed form, and by which these may miss
+BRUSHED = 1e-6  # the same of lobes with axes, whose readings take longest
 LIKELY = 3  # stacks that it begins with
 MAPPED, CLOSE = 4, 0.1  # requests, each corrected by what the model misses of the last one's stack, unless that is less
 SAME = 0.03  # logarithm by which models differ about the energy of an index
@@ -95,7 +96,8 @@ def _followed(found: Solution, target: Target, model: Model) -> Solution | None:
     if dragged is None or dragged.achromatic(target) is not target:
         return None
     here, goal = dragged.point.reading.value, dragged.space.goal(target)
-    there = Line(dragged.point, here, goal, *dragged.constant(target), enough=EXACT).last([FOLLOWED], whole=True)
+    enough = EXACT if target.kind is Isotropic else BRUSHED
+    there = Line(dragged.point, here, goal, *dragged.constant(target), enough=enough).last([FOLLOWED], whole=True)
     if there.bound is not None or not there.settled:
         return None
     return Solution(target, model, tuple(there.point.layers))
