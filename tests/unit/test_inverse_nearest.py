@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import itertools
 from typing import Any
 
@@ -14,7 +15,7 @@ from velatura.inverse import Infeasible, Target, invert, invert_stack
 from velatura.inverse.lobes.interface import CONDUCTOR_MAX
 from velatura.inverse.local.coordinates import Space
 from velatura.inverse.local.dragged import DraggedStack, seen
-from velatura.inverse.local.line import Line
+from velatura.inverse.local.line import Line, _Search
 from velatura.inverse.nearest import READINGS, Nearest, nearest
 from velatura.model import Model, named
 from velatura.model.variance import Roughness
@@ -165,6 +166,29 @@ def test_readings_that_jump_lead_to_no_number_too_large(monkeypatch: pytest.Monk
     with np.errstate(over="raise", divide="raise", invalid="raise"):
         found = answer(METAL, wish, model)
     assert 0 <= found.part <= 1 and np.isfinite(found.stack.point.x).all()
+
+
+def test_an_exact_search_goes_back_to_what_the_quick_one_found(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A bound that is found quickly, a little beside the line; then all readings are those of the start, far from it.
+
+    Expected: the search returns to that bound, which is the answer under the hand, and not to a point before it.
+    """
+    model = named("velatura")
+    monkeypatch.setattr(Space, "_solved", lambda space, x: space.quickly.read(x)[:, 0])
+    now = seen(METAL, Target([{"energy": 0.1}, {"energy": 0.1, "base": "conductor"}]), model)
+    wish = now.with_energy(0, (0.9,) * 3)
+    present = DraggedStack.of(METAL, wish, model)
+    assert present is not None
+    here = present.point.reading.value
+    line = Line(present.point, here, present.space.goal(wish))
+    search = _Search.of(line)
+    search.go(READINGS[0])
+    (reached, read), allowed = search.seen[-1], (line.allowed, search.line.allowed)
+    assert search.settled and reached.off < min(allowed) < max(allowed)
+    search.seen[-1] = dataclasses.replace(reached, off=float(np.mean(allowed))), read
+    monkeypatch.setattr(Space, "_solved", lambda *_: here)
+    search.refine(line, 1)
+    assert search.landing and search.base[0].part == reached.part > 0.1
 
 
 def test_a_lobe_that_stays_smooth_is_followed_at_once(monkeypatch: pytest.MonkeyPatch) -> None:

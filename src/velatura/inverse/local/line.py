@@ -440,17 +440,19 @@ class _Search:
         """Read at most so many points more, which lead back to the line, unless the search has ended on it."""
         if not self._ended and self.best[0].off >= self.line.enough:
             self._landed(self.best)
-            self._led(readings)
+            self._led(readings, self.best)
 
     def refine(self, line: Line, readings: int) -> None:
-        """Read at most so many points more, until they miss no more than the line allows."""
-        missed = self.line.enough
+        """Read at most so many points more, until they miss no more than the line allows: on from where the search has
+        ended, and if that leads elsewhere, from what was best so far."""
+        missed, ended, before = self.line.enough, self._ended, self.best
         self.exact(line)
-        if self._ended:
+        if ended:
             self._aimed(self.seen[-1][1], self.aim, missed)
         else:
-            self._landed(self.best)
-        self._led(readings)
+            before = self.best
+            self._landed(before)
+        self._led(readings, before)
 
     def end(self, readings: int) -> None:
         """Read at most so many points that lead to the end of the line, each from the nearest one so far: none that is
@@ -488,14 +490,13 @@ class _Search:
         """Whether the search has ended near the line."""
         return self.settled and self.seen[-1][0].off <= QUICKLY_ON_LINE
 
-    def _led(self, readings: int) -> None:
-        """Read at most so many points; where that leads elsewhere, back to the line from the best one before."""
-        best = self.best
+    def _led(self, readings: int, before: tuple[Reached, _Read]) -> None:
+        """Read at most so many points; where that leads elsewhere, back to the line from a point before."""
         for _ in range(readings):
             if self._ends():
                 return
             if not self.landing and self.last == np.inf:
-                self._landed(best)
+                self._landed(before)
 
     def _landed(self, at: tuple[Reached, _Read]) -> None:
         """Go back to the line from a point near it."""
