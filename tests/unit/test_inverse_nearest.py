@@ -15,7 +15,7 @@ from velatura.inverse import Infeasible, Target, invert, invert_stack
 from velatura.inverse.lobes.interface import CONDUCTOR_MAX
 from velatura.inverse.local.coordinates import Space
 from velatura.inverse.local.dragged import DraggedStack, seen
-from velatura.inverse.local.line import Line, _Search
+from velatura.inverse.local.line import KNOWN, Line, _Search
 from velatura.inverse.nearest import READINGS, Nearest, nearest
 from velatura.model import Model, named
 from velatura.model.variance import Roughness
@@ -131,6 +131,27 @@ def test_rounding_does_not_change_an_answer(monkeypatch: pytest.MonkeyPatch) -> 
     monkeypatch.setattr(Space, "_solved", lambda *where: read(*where) * (1 + 1e-13 * rng.normal()))
     found = [answer(coated(scale), wish, model, quick=True) for scale in (1, 1 + 1e-14)]
     assert found[0].stack.stack == found[1].stack.stack and found[0].part > 0.5
+
+
+def test_a_search_begins_alike_from_a_material_and_from_its_file() -> None:
+    """Expected: the same numbers, also of one that is all but 0, as of axes that lie together but for 3e-7 degrees:
+    what the file differs by is rounding, and a digit of such a number."""
+    layers = [
+        {"interface": {"eta": eta, "alpha": list(alpha), "rotation": rotation}}
+        for eta, alpha, rotation in (
+            (1.8778618222453656, (0.24990507341710935, 0.19537972918646332), 2.267795964587063e-07),
+            (1.1165737351462477, (0.06647251098576758, 0.04584325006201998), 5.4359012030614886e-05),
+            (1.459480105235685, (0.4704255284597616, 0.25883647934038234), 89.99999639040888),
+            (2.095059785317866, (0.368725991355685, 0.1995137500499877), 90.00000100703683),
+        )
+    ]
+    lobe: dict[str, Any] = {"energy": 0.1, "alpha": [0.25, 0.2], "interfaces": 2}
+    wish = Target([lobe, {**lobe, "rotation": 90}])
+    stack = DraggedStack.of(Stack.from_dict({"layers": layers}), wish, named("velatura"))
+    assert stack is not None
+    again = DraggedStack.of(stack.stack, wish, named("velatura"))
+    assert again is not None and not np.array_equal(stack.point.x, again.point.x)
+    assert np.array_equal(stack.rounded(KNOWN).point.x, again.rounded(KNOWN).point.x)
 
 
 def test_a_search_ends_where_nothing_leads_back_to_the_line(monkeypatch: pytest.MonkeyPatch) -> None:

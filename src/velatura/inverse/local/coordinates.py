@@ -488,9 +488,10 @@ class Point:
 
 
 def rounded(x: Array, digits: int) -> Array:
-    """Numbers of so many digits. A search of many steps may end elsewhere where a number differs by rounding, as those
-    do that are written to a file and read, or computed by kernels and by NumPy."""
-    return np.array([float(f"{each:.{digits}g}") for each in x.flat]).reshape(x.shape)
+    """Numbers of so many digits, and of no more decimals than numbers of their least unit, .01, have then. A search of
+    many steps may end elsewhere where a number differs by rounding, as those do that are written to a file and read, or
+    computed by kernels and by NumPy: by 1e-16, which next to 0 is a digit."""
+    return np.array([round(float(f"{each:.{digits}g}"), digits + 2) for each in x.flat]).reshape(x.shape)
 
 
 def units(x: Array) -> Array:
