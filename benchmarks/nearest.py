@@ -109,7 +109,7 @@ def nearer(present: DraggedStack, answer: Nearest, count: int, rng: np.random.Ge
         near = np.flatnonzero((off < wider * BESIDE) & (part > answer.part + NEARER / wider))
         return near[np.argsort(-part[near])][:most]
 
-    if space.slow:
+    if space.slow and points.size:
         points = points[:, ahead(roughly(space, x).read(points), WIDER, READ)]
     if not points.size:
         return 0.0

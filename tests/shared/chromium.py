@@ -15,7 +15,7 @@ import numpy as np
 # those that Playwright turns off, whose list this one replaces, and a pop-up of the address bar, a page of its own
 # beside each window.
 FLAGS = (
-    "--no-sandbox --disable-gpu --use-angle=swiftshader --enable-unsafe-swiftshader --disable-quic --no-first-run "
+    "--no-sandbox --process-per-site --disable-gpu --use-angle=swiftshader --enable-unsafe-swiftshader --disable-quic --no-first-run "
     "--disable-background-networking --disable-component-update --disable-sync "
     "--enable-unsafe-webgpu --use-webgpu-adapter=swiftshader --enable-angle-features=preferGlobalPipelineCache "
     "--disable-features=AvoidUnnecessaryBeforeUnloadCheckSync,DestroyProfileOnBrowserClose,HttpsUpgrades,"

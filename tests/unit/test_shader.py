@@ -14,6 +14,7 @@ import numpy as np
 import pytest
 from agreement import PATTERNS, in_numpy, random_case
 from evaluation import evaluate
+from manual import ROOT
 from python_printer import reader
 
 import velatura as vt
@@ -34,6 +35,7 @@ from velatura.shader.recorder.symbol import Symbol, colour, component, in_order,
 from velatura.shader.recorder.tape import tape
 from velatura.stack import Named, loads, rgb
 
+ENGINES = ROOT / "docs" / "how-to" / "engines.md"
 X, Y = np.random.default_rng(1).uniform(0.05, 0.95, (2, 20))
 RGB = np.random.default_rng(2).uniform(0.05, 0.95, (3, 20))
 
@@ -287,7 +289,7 @@ def test_another_medium_is_shaded_by_the_same_program() -> None:
 )
 def test_a_solved_material_takes_few_fetches(name: str, fetches: int, lines: int | None) -> None:
     """Energies, which neither values nor samples need, are read apart; and nothing of the layers is. The lobe of a
-    brushed metal is two."""
+    brushed metal is two. The manual's table of engines has the same, 16 bytes each."""
     made = shader(vt.preset(name))
     assert isinstance(made.baked, SolvedLookUp)
     columns, energies = made.baked.groups
@@ -299,6 +301,8 @@ def test_a_solved_material_takes_few_fetches(name: str, fetches: int, lines: int
     assert made.columns is not None
     assert made.columns.shape == (made.baked.height, made.baked.nodes[0], 4)
     assert lines is None or made.text.count("\n") <= lines
+    printed = re.search(rf"^\| {name} \| `velatura` \|.* (\d+) \| \d+ \|$", ENGINES.read_text(encoding="utf-8"), re.M)
+    assert printed is None or int(printed[1]) == 16 * fetches
 
 
 @pytest.mark.parametrize(
