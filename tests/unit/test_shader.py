@@ -35,7 +35,7 @@ from velatura.shader.recorder.symbol import Symbol, colour, component, in_order,
 from velatura.shader.recorder.tape import tape
 from velatura.stack import Named, loads, rgb
 
-ENGINES = ROOT / "docs" / "how-to" / "engines.md"
+GUIDES = ROOT / "docs" / "how-to"
 X, Y = np.random.default_rng(1).uniform(0.05, 0.95, (2, 20))
 RGB = np.random.default_rng(2).uniform(0.05, 0.95, (3, 20))
 
@@ -284,12 +284,16 @@ def test_another_medium_is_shaded_by_the_same_program() -> None:
 
 
 @pytest.mark.parametrize(
-    ("name", "fetches", "lines"),
-    [("coated-gold", 20, 370), ("coated-rough-metal", 4, 310), ("frosted-glass", 54, None)],
+    ("name", "fetches", "printed", "lines"),
+    [
+        ("coated-gold", 20, "takes 20 texel fetches for coated brushed gold", 370),
+        ("coated-rough-metal", 4, "4 for a coated isotropic metal", 310),
+        ("frosted-glass", 54, "54 for a pane", None),
+    ],
 )
-def test_a_solved_material_takes_few_fetches(name: str, fetches: int, lines: int | None) -> None:
+def test_a_solved_material_takes_few_fetches(name: str, fetches: int, printed: str, lines: int | None) -> None:
     """Energies, which neither values nor samples need, are read apart; and nothing of the layers is. The lobe of a
-    brushed metal is two. The manual's table of engines has the same, 16 bytes each."""
+    brushed metal is two. The manual has the same, and in its table of engines 16 bytes each."""
     made = shader(vt.preset(name))
     assert isinstance(made.baked, SolvedLookUp)
     columns, energies = made.baked.groups
@@ -301,8 +305,10 @@ def test_a_solved_material_takes_few_fetches(name: str, fetches: int, lines: int
     assert made.columns is not None
     assert made.columns.shape == (made.baked.height, made.baked.nodes[0], 4)
     assert lines is None or made.text.count("\n") <= lines
-    printed = re.search(rf"^\| {name} \| `velatura` \|.* (\d+) \| \d+ \|$", ENGINES.read_text(encoding="utf-8"), re.M)
-    assert printed is None or int(printed[1]) == 16 * fetches
+    shaders, engines = ((GUIDES / page).read_text(encoding="utf-8") for page in ("shaders.md", "engines.md"))
+    assert printed in shaders
+    row = re.search(rf"^\| {name} \| `velatura` \|.* (\d+) \| \d+ \|$", engines, re.MULTILINE)
+    assert row is None or int(row[1]) == 16 * fetches
 
 
 @pytest.mark.parametrize(
