@@ -11,12 +11,12 @@ from typing import Any
 
 import numpy as np
 
-# Programs of earlier pages are found again, which SwiftShader compiles in most of the time of a page, and pages of one
-# address share a process, which has compiled their code. The features are those that Playwright turns off, whose list
-# this one replaces, and a pop-up of the address bar, a page of its own beside each window.
+# Programs of earlier pages are found again, which SwiftShader compiles in most of the time of a page. The features are
+# those that Playwright turns off, whose list this one replaces, and a pop-up of the address bar, a page of its own
+# beside each window.
 FLAGS = (
-    "--no-sandbox --process-per-site --disable-gpu --use-angle=swiftshader --enable-unsafe-swiftshader --disable-quic "
-    "--no-first-run --disable-background-networking --disable-component-update --disable-sync "
+    "--no-sandbox --disable-gpu --use-angle=swiftshader --enable-unsafe-swiftshader --disable-quic --no-first-run "
+    "--disable-background-networking --disable-component-update --disable-sync "
     "--enable-unsafe-webgpu --use-webgpu-adapter=swiftshader --enable-angle-features=preferGlobalPipelineCache "
     "--disable-features=AvoidUnnecessaryBeforeUnloadCheckSync,DestroyProfileOnBrowserClose,HttpsUpgrades,"
     "HttpsFirstBalancedModeAutoEnable,LensOverlay,MediaRouter,PaintHolding,ThirdPartyStoragePartitioning,"
