@@ -215,9 +215,8 @@ class Visit:
 class Tabs:
     """Tabs of a browser without a past, for one test after another.
 
-    The first tab of each test is the same, and need not be made; each address that it leaves for another has a process
-    of its own.
-    Two pixels of the page, along both axes, are one of the screen, and of the picture.
+    The first tab of each test is the same, and need not be made; each page that it opens has a process of its own. Two
+    pixels of the page, along both axes, are one of the screen, and of the picture.
     """
 
     def __init__(self, browser: Any, size: tuple[int, int] = (900, 600), **options: Any) -> None:
