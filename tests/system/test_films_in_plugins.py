@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from images import write_image
 
 import velatura as vt
 from velatura import kernel
@@ -15,6 +16,8 @@ from velatura.model.solved import solve
 from velatura.optics.films import OpticalFilm, coherent
 from velatura.renderer.packets import aligned
 from velatura.stack import luminance_sensitivity, srgb_weights
+
+pytestmark = pytest.mark.usefixtures("one_thread")
 
 COATED = vt.Stack(
     [
@@ -111,9 +114,9 @@ def test_gradients_are_finite_differences(
     assert np.ravel(dr.grad(found)) == pytest.approx((high - low) / (ends[1] - ends[0]), rel=0.06, abs=4e-4)
 
 
-def grey(mi: Any, path: Path, ends: tuple[float, float]) -> str:
+def grey(path: Path, ends: tuple[float, float]) -> str:
     """An image from one value to another, which a texture interpolates between a quarter and three of its width."""
-    mi.util.write_bitmap(str(path), np.array([[[ends[0]], [ends[1]]]] * 2, np.float32), write_async=False)
+    write_image(np.array([[[ends[0]], [ends[1]]]] * 2, np.float32), path)
     return str(path)
 
 
@@ -130,7 +133,7 @@ def of_textures(stack: vt.Stack, spans: Spans, image: str, share: float = 0.5) -
 @pytest.mark.parametrize("model", ["velatura", "belcour2018"])
 def test_a_texture_of_thickness_is_the_material_of_each_thickness(mi: Any, model: str, tmp_path: Path) -> None:
     """Of four fringes; energies and values within .003 of what is reflected the most."""
-    texture = {"texture": grey(mi, tmp_path / "t.exr", (0.0, 1.0)), "scale": 500.0, "offset": 100.0}
+    texture = {"texture": grey(tmp_path / "t.exr", (0.0, 1.0)), "scale": 500.0, "offset": 100.0}
     textured = vt.bsdf(OXIDE.replace(layer0_film0_thickness_nm=texture), model=model, reflectance="fgd")
     thicknesses = np.array([103.0, 264.0, 555.5])
     u = 0.25 + 0.5 * (thicknesses - 100) / 500
@@ -153,7 +156,7 @@ def test_a_texture_of_thickness_is_the_material_of_each_thickness(mi: Any, model
 def test_the_walk_has_textures_of_films(mi: Any, stack: vt.Stack, cosine: float, spans: Spans, tmp_path: Path) -> None:
     """Its paths are the same as those of the uniform material, to rounding and to the error of the fixed quadrature."""
     uniform, textured = (
-        vt.bsdf(each, model="reference") for each in of_textures(stack, spans, grey(mi, tmp_path / "t.exr", (0.0, 1.0)))
+        vt.bsdf(each, model="reference") for each in of_textures(stack, spans, grey(tmp_path / "t.exr", (0.0, 1.0)))
     )
     count, found = 20_000, []
     for bsdf in (uniform, textured):
@@ -180,7 +183,7 @@ def test_textures_of_films_are_the_material_of_each_value(
     mi: Any, model: str, stack: vt.Stack, spans: Spans, tmp_path: Path
 ) -> None:
     """Energies within .003, and values within .02 of the largest: a pane reflects red beyond sRGB."""
-    image = grey(mi, tmp_path / "t.exr", (0.0, 1.0))
+    image = grey(tmp_path / "t.exr", (0.0, 1.0))
     uniform, textured = (
         vt.bsdf(each, model=model, reflectance="fgd") for each in of_textures(stack, spans, image, 0.33)
     )
@@ -194,7 +197,7 @@ def test_textures_of_films_are_the_material_of_each_value(
 def test_a_colour_that_a_film_hardly_reflects_stays_dark_in_a_texture(mi: Any, tmp_path: Path) -> None:
     """Red, of a pane; the noise of samples is a third of what is allowed."""
     spans, found = {"layer1_film0_thickness_nm": (140.0, 30.0)}, []
-    stacks = of_textures(PANE, spans, grey(mi, tmp_path / "t.exr", (0.0, 1.0)), 0.2)
+    stacks = of_textures(PANE, spans, grey(tmp_path / "t.exr", (0.0, 1.0)), 0.2)
     count, si = 200_000, lit(mi, 0.8, np.full(200_000, 0.35))
     for bsdf in (vt.bsdf(stack, reflectance="fgd") for stack in stacks):
         rng = mi.PCG32(count)
@@ -206,7 +209,7 @@ def test_a_colour_that_a_film_hardly_reflects_stays_dark_in_a_texture(mi: Any, t
 
 def test_each_colour_has_its_own_index_from_a_texture(mi: Any, tmp_path: Path) -> None:
     texels = np.array([[[0.1, 0.5, 0.9]]] * 2, np.float32)
-    mi.util.write_bitmap(str(tmp_path / "t.exr"), texels, write_async=False)
+    write_image(texels, tmp_path / "t.exr")
     texture = {"texture": str(tmp_path / "t.exr"), "scale": 0.5, "offset": 1.4}
     textured, uniform = (
         vt.bsdf(OXIDE.replace(layer0_film0_eta=eta)) for eta in (texture, tuple((1.4 + 0.5 * texels[0, 0]).tolist()))
@@ -219,7 +222,7 @@ def test_light_from_below_meets_the_film_that_has_a_texture(mi: Any, film: int, 
     """Among others, in either order."""
     films = [vt.Film(eta=eta, thickness_nm=120) for eta in (2.2, 1.38, 1.8)]
     stack = vt.Stack([vt.Interface(eta=1.5, alpha=0.1, films=films)])
-    image = grey(mi, tmp_path / "t.exr", (0.0, 1.0))
+    image = grey(tmp_path / "t.exr", (0.0, 1.0))
     spans = {f"layer0_film{film}_thickness_nm": (100.0, 200.0)}
     uniform, textured = (vt.bsdf(each, model="weier2020") for each in of_textures(stack, spans, image))
     si, wo = lit(mi, -0.8), mi.Vector3f(-0.6, 0.02, -0.8)
@@ -233,7 +236,7 @@ def test_light_from_below_meets_the_film_that_has_a_texture(mi: Any, film: int, 
 def test_texels_beside_films_have_gradients(mi: Any, key: str, offset: float, scale: float, tmp_path: Path) -> None:
     import drjit as dr
 
-    texture = {"texture": grey(mi, tmp_path / "t.exr", (0.45, 0.55)), "scale": scale, "offset": offset}
+    texture = {"texture": grey(tmp_path / "t.exr", (0.45, 0.55)), "scale": scale, "offset": offset}
     bsdf = vt.bsdf(OXIDE.replace(layer0_k=5.0, layer0_eta=1.0).replace(**{f"layer0_{key}": texture}))
     parameters = mi.traverse(bsdf)
     name = f"layer0_{key}.data"
@@ -343,7 +346,7 @@ def test_spectra_of_films_add_up_to_their_colours(mi: Any) -> None:
 @pytest.mark.parametrize("name", ["layer0_film0_thickness_nm", "layer0_alpha"])
 def test_textures_beside_films_have_spectra(spectral: Any, name: str, tmp_path: Path) -> None:
     low, step = (250.0, 100.0) if name.endswith("nm") else (0.1, 0.2)
-    texture = {"texture": grey(spectral, tmp_path / "t.exr", (0.0, 1.0)), "scale": step, "offset": low}
+    texture = {"texture": grey(tmp_path / "t.exr", (0.0, 1.0)), "scale": step, "offset": low}
     textured, uniform = (vt.bsdf(OXIDE.replace(**{name: x})) for x in (texture, low + 0.5 * step))
     found, expected = (
         np.ravel(bsdf.eval_diffuse_reflectance(at_wavelengths(spectral, 0.6))) for bsdf in (textured, uniform)

@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from images import write_image
 
 import velatura as vt
 from velatura import kernel
@@ -15,6 +16,8 @@ from velatura.model import MODELS
 
 mi = kernel.mitsuba("llvm_ad_rgb")
 import drjit as dr  # noqa: E402
+
+pytestmark = pytest.mark.usefixtures("one_thread")
 
 STACK = vt.Stack(
     [
@@ -46,7 +49,7 @@ WI, WO = (0.4, 0.3, 0.8), (-0.45, -0.15, 0.75)
 
 
 def image(folder: Path, texels, name: str = "image.exr") -> Path:
-    mi.Bitmap(np.asarray(texels, np.float32)).write(str(folder / name))
+    write_image(np.asarray(texels, np.float32), folder / name)
     return folder / name
 
 
@@ -108,8 +111,8 @@ def test_one_image_for_both_axes_leaves_an_interface_isotropic(tmp_path) -> None
 def test_channels_and_encodings_are_those_of_the_image(tmp_path) -> None:
     """Opacity, one channel of colours, grey as any of them, sRGB, scale and offset."""
     colours = np.uint8([[[51, 102, 153, 204]]])
-    mi.Bitmap(colours).write(str(tmp_path / "rgba.png"))
-    mi.Bitmap(colours[..., :1]).write(str(tmp_path / "grey.png"))
+    write_image(colours, tmp_path / "rgba.png")
+    write_image(colours[..., :1], tmp_path / "grey.png")
     cases = {
         ("rgba.png", "b", "linear"): 0.6,
         ("rgba.png", "a", "linear"): 0.8,
