@@ -15,7 +15,7 @@ from velatura.inverse import Infeasible, Target, invert, invert_stack
 from velatura.inverse.lobes.interface import CONDUCTOR_MAX
 from velatura.inverse.local.coordinates import Space
 from velatura.inverse.local.dragged import DraggedStack, seen
-from velatura.inverse.local.line import KNOWN, Line, _Search
+from velatura.inverse.local.line import EXACT, KNOWN, QUICK, Line, _Search
 from velatura.inverse.nearest import READINGS, Nearest, nearest
 from velatura.model import Model, named
 from velatura.model.variance import Roughness
@@ -210,6 +210,29 @@ def test_an_exact_search_goes_back_to_what_the_quick_one_found(monkeypatch: pyte
     monkeypatch.setattr(Space, "_solved", lambda *_: here)
     search.refine(line, 1)
     assert search.landing and search.base[0].part == reached.part > 0.1
+
+
+@pytest.mark.parametrize("enough", [QUICK, EXACT])
+def test_a_search_under_the_hand_is_led_back_to_the_line_as_one_at_rest_is(
+    monkeypatch: pytest.MonkeyPatch, enough: float
+) -> None:
+    """Rationale: of a pair wished far rougher, the first try to lead back to the line ended .17 beside it, and the next
+    one, which only the answer at rest had, on the line, .353 of the way. Expected: both have a next one, if the first
+    one ends beside the line alone."""
+    model, tries = named("velatura"), list[int]()
+    monkeypatch.setattr(Space, "_solved", lambda space, x: space.quickly.read(x)[:, 0])
+    monkeypatch.setattr(_Search, "go", lambda *_: None)
+    monkeypatch.setattr(_Search, "land", lambda _, readings: tries.append(readings))
+    monkeypatch.setattr(_Search, "refine", lambda *_: None)
+    wish = Target([{"energy": 0.1}, {"energy": 0.1, "base": "conductor"}])
+    present = DraggedStack.of(METAL, wish, model)
+    assert present is not None
+    here, goal = present.point.reading.value, present.space.goal(wish)
+    for beside, expected in ((0.0, 1), (0.1, 2)):
+        tries.clear()
+        origin = here + beside * np.eye(len(here))[-1]
+        Line(present.point, origin, goal + origin - here, enough=enough).last(READINGS)
+        assert tries == [READINGS[0]] * expected
 
 
 def test_a_lobe_that_stays_smooth_is_followed_at_once(monkeypatch: pytest.MonkeyPatch) -> None:

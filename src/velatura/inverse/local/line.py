@@ -33,7 +33,8 @@ FOLLOWED, ASTRAY = 0.05, 0.5  # misses that are small, and first ones that lead 
 SLOWLY, NEAR = 0.7, 0.015  # the share of the last miss that is no progress, and misses from which the way goes on
 SEEN, BACK = 0.03, 0.7  # of the way that is gone astray: the least that counts, and the share to go
 FURTHER_ON, ONWARDS, SHORT = 2.0, 0.02, 2e-3  # steps along the line: by an easy last one, anew, and the least
-LANDING, LOWER = 4, 0.01  # readings that lead back to the line, and by how much less is aimed at first if they do not
+LANDING, LANDINGS = 4, 2  # readings that lead back to the line, and searches that do, at the end
+LOWER = 0.01  # by how much less is aimed at first if they do not
 BRIGHTEST, FOLDED = 1.0, 1 - 1e-3  # the largest energy, and variance, folded, that a correction leads to
 DIGITS, KNOWN = 7, 9  # of readings of a slow model, and of all else that the search goes on with
 BENT = 0.5  # by how much corrections are off their slopes, as a share of the square of a distance
@@ -101,7 +102,10 @@ class Line:
                 if search.settled or (n and search.best[0].part < before + ONWARDS):
                     break
             settled = search.settled
-            search.land(readings[0])
+            for _ in range(LANDINGS):
+                search.land(readings[0])
+                if search.best[0].off < QUICKLY_ON_LINE:
+                    break
             if self.enough < QUICK:
                 search.refine(self, readings[0])
         best = search.best[1].unrounded
