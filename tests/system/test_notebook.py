@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import re
 from importlib.util import find_spec
 from pathlib import Path
@@ -18,6 +19,8 @@ pytestmark = pytest.mark.skipif(bool(LACKS), reason=f"missing: {LACKS}")
 NOTEBOOKS = sorted((Path(__file__).parents[2] / "docs" / "tutorials").glob("*.ipynb"))
 LARGEST = 700_000  # bytes
 
+QUICKLY = Path(__file__).parents[1] / "shared" / "quickly"
+
 each = pytest.mark.parametrize("notebook", NOTEBOOKS, ids=[path.stem for path in NOTEBOOKS])
 
 
@@ -33,13 +36,20 @@ def printed(cell: Any) -> str:
 
 @each
 def test_a_notebook_runs_and_prints_what_it_has_stored(
-    notebook: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    notebook: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, request: pytest.FixtureRequest
 ) -> None:
-    """What is printed is rounded so that it is the same everywhere; of pictures it counts that there are any."""
+    """What is printed is rounded so that it is the same everywhere, and where samples are few; of pictures it counts
+    that there are any."""
     import nbclient
 
-    monkeypatch.setenv("PYTHONPATH", str(Path(velatura.__file__).parents[1]))
+    cache = getattr(request.config, "cache", None)
+    monkeypatch.setenv("DRJIT_CACHE_DIR", str(cache.mkdir("kernels") if cache else tmp_path / "kernels"))
+    monkeypatch.setenv("PYTHONPATH", os.pathsep.join(map(str, (QUICKLY, Path(velatura.__file__).parents[1]))))
     monkeypatch.setenv("IPYTHONDIR", str(tmp_path / "ipython"))
+    profile = tmp_path / "ipython" / "profile_default"
+    profile.mkdir(parents=True)
+    # Not a file of "startup", whose names the notebook would have
+    (profile / "ipython_kernel_config.py").write_text("import few_in_notebooks")
     expected, run = stored(notebook), stored(notebook)
     nbclient.NotebookClient(run, timeout=300, resources={"metadata": {"path": str(tmp_path)}}).execute()
     for cell, before in zip(run.cells, expected.cells):
