@@ -64,7 +64,7 @@ ELSEWHERE = {
 BESIDES = {
     "velatura benchmark score --edition 2": ("--model walk,velatura,openpbr", "the first has scored all"),
     **{
-        f"velatura invert {target}": (f"--model {QUICK}", "tests/system/test_invert_cli.py asks the default model")
+        f"velatura invert {target}": (f"--model {QUICK}", "tests/unit/test_inverse_wishes.py asks the default model")
         for target in ("pane.yaml", "bright-edge.yaml", "workshop.yaml", "lacquered.yaml")
     },
 }
