@@ -65,7 +65,7 @@ BESIDES = {
     "velatura benchmark score --edition 2": ("--model walk,velatura,openpbr", "the first has scored all"),
     **{
         f"velatura invert {target}": (f"--model {QUICK}", "tests/unit/test_inverse_wishes.py asks the default model")
-        for target in ("pane.yaml", "bright-edge.yaml", "workshop.yaml", "lacquered.yaml")
+        for target in ("pane.yaml", "bright-edge.yaml", "workshop.yaml")
     },
 }
 # Languages that are not run here, and why
