@@ -59,6 +59,25 @@ def few_samples(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 @pytest.fixture
+def coarse_solutions(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Materials solved by a quarter of the samples on half of the nodes, for tests that compare two programs which both
+    have the same solution, however near the truth that is."""
+    from velatura.model.solved import equivalent_roughness, grid, reciprocal_balance, solve, wide_light
+    from velatura.model.solved.energies import energies
+
+    monkeypatch.setattr(energies, "NODES", 12)
+    monkeypatch.setattr(solve, "SAMPLES", 89)
+    monkeypatch.setattr(solve, "NORMALS", {True: 377, False: 233})
+    monkeypatch.setattr(solve, "BETWEEN", {True: 34, False: 34})
+    monkeypatch.setattr(solve, "EVENLY", 89)
+    monkeypatch.setattr(wide_light, "EVENLY", 55)
+    monkeypatch.setattr(reciprocal_balance, "SAMPLES", {0: 89})
+    monkeypatch.setattr(equivalent_roughness, "SAMPLES", 4 * 89)
+    monkeypatch.setattr(grid, "COSINES", 16)
+    monkeypatch.setattr(grid, "AZIMUTHS", {False: 8, True: 8})
+
+
+@pytest.fixture
 def run(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> Run:
     """Runs the command line in this process: exit status, standard output, standard error."""
 

@@ -250,6 +250,12 @@ float vt_read(int i, int row) {
 """
 
 
+def recording_of(made: Shader) -> Recording:
+    """What the shader of a stack alone was printed from."""
+    (part,) = made.parts
+    return part.recording
+
+
 def textures(made: Shader) -> dict[str, np.ndarray]:
     """Textures that a shader reads, by name."""
     read = {"vt_tables": made.tables if made.looked_up else None, "vt_baked": made.columns, "vt_films": made.films}
@@ -319,7 +325,7 @@ class Changeable:
     @classmethod
     def of(cls, stack: Stack, machine: Machine) -> Changeable:
         made = shader(stack, values="uniforms", printer=machine.printer)
-        return cls(made, record(stack, parameters=True), machine)
+        return cls(made, recording_of(made), machine)
 
     def given(self, case: Case) -> Results:
         """The results where the program is given the values and the solution of a case's stack."""
@@ -382,9 +388,9 @@ def compare(
     """Random stacks of a pattern through both, with `films` or without."""
     case = random_case(pattern, count, np.random.default_rng(seed))
     case = coated(case) if films else case
-    recording = record(case.stack, model, **switches)
     printer = by.printer if isinstance(by, Machine) else GLSL
     made = shader(case.stack, model, printer=printer, **switches)
+    recording = recording_of(made)
     found = (
         on_machine(case, recording, made, by) if isinstance(by, Machine) else in_browser(case, recording, made, by)[0]
     )

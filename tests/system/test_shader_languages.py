@@ -26,6 +26,7 @@ from agreement import (
     on_machine,
     program,
     random_case,
+    recording_of,
     textures,
     together,
 )
@@ -37,6 +38,8 @@ from velatura.model.solved.bsdf import MAX_SAMPLE_WEIGHT
 from velatura.shader import constant, record, shader
 from velatura.shader.printers.glsl import Vulkan
 from velatura.shader.program import prefixed
+
+coarse = pytest.mark.usefixtures("coarse_solutions")
 
 # Patterns that together have every kind of layer and every shape; merged lobes, films, brushed `velatura`, and the form
 # that looks at pairs of directions
@@ -50,6 +53,7 @@ CASES: dict[str, list[tuple[int, str, bool, dict[str, str]]]] = {
 EVERY = [(name, *case) for name, cases in CASES.items() for case in cases]
 
 
+@coarse
 @pytest.mark.parametrize(("name", "pattern", "model", "films", "switches"), EVERY)
 def test_every_language_is_the_model(
     name: str, pattern: int, model: str, films: bool, switches: dict[str, Any]
@@ -83,6 +87,7 @@ ON_TOP: dict[str, list[tuple[list[Any], str]]] = {
 }
 
 
+@coarse
 @pytest.mark.parametrize(("name", "layers", "form"), [(name, *case) for name, each in ON_TOP.items() for case in each])
 def test_a_medium_on_top_is_the_model_in_every_language(name: str, layers: list[Any], form: str) -> None:
     """Expected: energies within 1e-4, and values and densities within 1e-3, from both sides."""
@@ -90,9 +95,9 @@ def test_a_medium_on_top_is_the_model_in_every_language(name: str, layers: list[
         pytest.skip(why)
     stack = vt.Stack(layers)
     case = Case(stack, {}, random_case((stack.kinds, "round"), 60, np.random.default_rng(7)).directions)
-    recording = record(stack, form=form)
-    assert not recording.model.closed_form
     made = shader(stack, printer=MACHINES[name].printer, form=form)
+    recording = recording_of(made)
+    assert not recording.model.closed_form
     truth, found = in_numpy(case, recording), on_machine(case, recording, made, MACHINES[name])
     # Roughnesses of interfaces without a step of the index do not count
     truth, found = (replace(each, alpha=0 * each.alpha + 1) for each in (truth, found))
@@ -114,6 +119,7 @@ WIDE: dict[str, tuple[list[vt.Interface | vt.Medium], str]] = {
 }
 
 
+@coarse
 @pytest.mark.parametrize("name", WIDE)
 def test_wide_light_is_the_model_in_every_language(name: str) -> None:
     """Expected: energies within 1e-4, and values and densities within 1e-3, from both sides, where the plugin draws
@@ -123,14 +129,15 @@ def test_wide_light_is_the_model_in_every_language(name: str) -> None:
     layers, form = WIDE[name]
     stack = vt.Stack(layers, thin=True)
     case = Case(stack, {}, random_case((stack.kinds, "round"), 60, np.random.default_rng(7)).directions)
-    recording = record(stack, form=form)
-    assert "wide_passed[0]" in recording.lobes
     made = shader(stack, printer=MACHINES[name].printer, form=form)
+    recording = recording_of(made)
+    assert "wide_passed[0]" in recording.lobes
     apart = differences(in_numpy(case, recording), on_machine(case, recording, made, MACHINES[name]))
     assert max(apart.energy, apart.alpha, apart.drawn) < 1e-4
     assert max(apart.value, apart.density) < 1e-3
 
 
+@coarse
 def test_a_program_of_dust_on_glass_draws_fog() -> None:
     """Expected: given the values and the solution of a medium alone, which passes light of another shape."""
     if why := MACHINES["wgsl"].missing():
@@ -156,6 +163,7 @@ def test_a_wrong_constant_is_seen(name: str) -> None:
     assert differences(in_numpy(case, recording), found).energy > 1e-4
 
 
+@coarse
 @pytest.mark.parametrize("name", MACHINES)
 def test_one_program_holds_two_materials(name: str) -> None:
     """Expected: each has its own functions, structs and textures, and answers as it does alone."""
@@ -170,7 +178,7 @@ def test_one_program_holds_two_materials(name: str) -> None:
         fixed = [] if model == "velatura" else list(case.stack.flat())
         printer = replace(machine.printer, binding=place)
         made = shader(case.stack, model, fixed, printer=printer, prefix=prefix)
-        recording = record(case.stack, model, fixed)
+        recording = recording_of(made)
         called = program(case, recording, made, printer)
         lines = [line if "vt_read" in line else prefixed(line, prefix) for line in called.lines]
         named = [prefixed(answer, prefix) for answer in called.answers]
@@ -195,6 +203,7 @@ MIXED = {
 }
 
 
+@coarse
 @pytest.mark.parametrize("name", MIXED)
 def test_mixtures_in_every_language_are_the_model(name: str) -> None:
     """Expected: values, densities and samples of random mixtures, one within another, within the bounds of stacks."""
@@ -228,8 +237,8 @@ def test_lobes_of_any_model_may_be_baked(name: str) -> None:
     stack = vt.preset(preset)
     below = "dielectric" if stack.transmits else "conductor"
     case = Case(stack, {}, random_case(((below,), "round"), 300, np.random.default_rng(3)).directions)
-    recording = record(stack, model, baking=True)
     made = shader(stack, model, printer=machine.printer, baking=True)
+    recording = recording_of(made)
     assert made.columns is not None and made.uniforms == {}
     assert "vt_tables" not in made.text and "sigma" not in made.text
     found, truth = on_machine(case, recording, made, machine), in_numpy(case, recording)
@@ -248,12 +257,14 @@ def test_a_black_material_has_a_shader(to: str) -> None:
     assert vt.export(black, to)
 
 
+@coarse
 def test_a_program_of_matt_paint_holds_values_that_change() -> None:
     """Expected: a weight for the remainder and one for what passes, which no interface stands before."""
     made = shader(vt.Stack([FOG, vt.Diffuse(albedo=0.4)]), values="uniforms")
     assert made.baked is not None and list(made.shown) == ["remainder"]
 
 
+@coarse
 @pytest.mark.parametrize(("to", "beneath"), [("osl", vt.Interface(eta=1.5, alpha=0.1)), ("mtlx", AIR)], ids=str)
 def test_a_medium_on_an_interface_has_closures(to: str, beneath: vt.Interface) -> None:
     """Its lower side ends with a medium. Expected: the stated difference in albedo, of light that goes straight through
@@ -270,6 +281,7 @@ def test_what_varies_is_not_baked(tmp_path: Path) -> None:
         vt.export(stack, "wgsl", "belcour2018", baked=True)
 
 
+@coarse
 @pytest.mark.parametrize("name", MACHINES)
 def test_values_that_change_stand_in_a_block(name: str) -> None:
     """Expected: compilers take a program whose material, weights, remainder and layout change."""
@@ -288,6 +300,7 @@ def test_values_that_change_stand_in_a_block(name: str) -> None:
         machine.compile("\n".join([made.text, machine.declarations(1), machine.main(lines)]))
 
 
+@coarse
 @pytest.mark.parametrize(
     ("name", "pattern"), [*((name, 23) for name in MACHINES), ("vulkan", 26), ("glsl450", 30), ("wgsl", 57)]
 )
@@ -307,6 +320,7 @@ def test_values_that_change_are_those_of_the_program(name: str, pattern: int) ->
     assert differences(truth, replace(found, alpha=truth.alpha)).value < 1e-3
 
 
+@coarse
 def test_a_program_of_clear_panes_draws_frosted_ones() -> None:
     """Expected: given the values and the solution of a pane that passes light too wide for lobes, and of one that does
     not. Values count where no sample is as heavy as may be, since densities differ."""
@@ -393,11 +407,12 @@ def on_texels(stack: vt.Stack, machine: Machine, maps: dict[str, Any], uv: np.nd
     made = shader(stack, "weier2020", printer=machine.printer)
     assert not any(str(image.texture) in made.text for image in made.maps.values())
     case = Case(stack, {}, {**directions, "at": np.array([*uv, uv[0]])})
-    called = program(case, record(stack, "weier2020"), replace(made, uniforms={}), machine.printer)
+    called = program(case, recording_of(made), replace(made, uniforms={}), machine.printer)
     (found,) = together([of_material(called, machine, "at.xy")], made.text, machine, {**textures(made), **maps})
     return called.results(found)
 
 
+@coarse
 @pytest.mark.parametrize(
     ("preset", "model", "exclusive"),
     [

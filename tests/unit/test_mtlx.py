@@ -62,6 +62,7 @@ def test_all_generators_make_code_of_layers_with_textures(
     assert [node.getInputValue("file") for node in images] == [] if "brushing" in varies else [image] * len(images)
 
 
+@pytest.mark.usefixtures("coarse_solutions")
 @pytest.mark.parametrize(("preset", "off"), [("frosted-metal", 0.01), ("turned-brushing", 0.1)])
 def test_polynomials_are_the_columns_that_they_stand_for(preset: str, off: float) -> None:
     """Weights within .01; roughness too, but of brushed lobes, which changes fast at some azimuths."""

@@ -59,6 +59,7 @@ def test_recorded_closures_are_those_of_numpy(pattern, model: str, filmed: bool)
         np.testing.assert_allclose(np.broadcast_to(a, (3, 12)), np.broadcast_to(b, (3, 12)), rtol=1e-6, atol=1e-12)
 
 
+@pytest.mark.usefixtures("coarse_solutions")
 @pytest.mark.parametrize("preset", ["turned-brushing", "frosted-glass"])
 def test_tabulated_closures_have_the_light_of_the_lobes(preset: str) -> None:
     """Between nodes: all energy that `velatura.lobes` reports, and its roughness, above the grazing directions."""
@@ -197,6 +198,7 @@ def test_closures_of_a_mixture_are_those_of_its_stacks_by_their_shares() -> None
         np.testing.assert_allclose(np.broadcast_to(a, (3, 12)), np.broadcast_to(b, (3, 12)), rtol=1e-6, atol=1e-12)
 
 
+@pytest.mark.usefixtures("coarse_solutions")
 def test_a_mixture_is_one_shader(tmp_path: Path) -> None:
     """Expected: parameters by flat name, a weight from its texture, columns of each solved stack."""
     (tmp_path / "worn.png").touch()
