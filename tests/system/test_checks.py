@@ -444,6 +444,7 @@ def test_a_lobe_too_sharp_for_the_cells_is_left_out_however_few_samples_it_gets(
     assert int(found.detail.split()[0]) > 100
 
 
+@pytest.mark.usefixtures("coarse_solutions")
 def test_a_lobe_that_the_cells_nearly_resolve_is_left_out_as_well() -> None:
     """Expected: lobes of .6 by .001, whose integrals are known to .25 %, are no breach."""
     layers = [vt.Interface(eta=1.63), vt.Interface(eta=1.2), vt.Interface(eta=1.35, alpha=(0.0, 0.623))]
