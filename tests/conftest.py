@@ -5,6 +5,7 @@ from __future__ import annotations
 import gc
 import sys
 from collections.abc import Callable, Iterator
+from functools import partial
 from pathlib import Path
 
 import pytest
@@ -62,11 +63,12 @@ def few_samples(monkeypatch: pytest.MonkeyPatch) -> None:
 def coarse_solutions(monkeypatch: pytest.MonkeyPatch) -> None:
     """Materials solved by a quarter of the samples on half of the nodes, for tests that compare two programs which both
     have the same solution, however near the truth that is."""
-    from velatura.model.solved import equivalent_roughness, grid, reciprocal_balance, solve, wide_light
+    from velatura.model.solved import equivalent_roughness, grid, reciprocal_balance, solve, statistics, wide_light
     from velatura.model.solved.energies import energies
 
     monkeypatch.setattr(energies, "NODES", 12)
     monkeypatch.setattr(solve, "SAMPLES", 89)
+    monkeypatch.setattr(statistics, "energies", partial(energies.energies, samples=89))
     monkeypatch.setattr(solve, "NORMALS", {True: 377, False: 233})
     monkeypatch.setattr(solve, "BETWEEN", {True: 34, False: 34})
     monkeypatch.setattr(solve, "EVENLY", 89)
