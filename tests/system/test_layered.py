@@ -9,6 +9,7 @@ import pytest
 
 import velatura as vt
 from velatura import kernel
+from velatura.comparison import evaluated_lobes
 from velatura.comparison.evaluated_lobes import account
 from velatura.errors import InvalidInput
 from velatura.model import named
@@ -172,7 +173,7 @@ def test_a_smooth_stack_is_a_mirror_of_all_its_lobes() -> None:
 
 
 def test_many_smooth_layers_are_a_mirror_without_loss() -> None:
-    layers = [vt.Interface(eta=1.5 if k % 2 == 0 else 1.3) for k in range(29)]
+    layers = [vt.Interface(eta=1.5 if k % 2 == 0 else 1.3) for k in range(15)]
     bsdf = vt.bsdf(vt.Stack([*layers, vt.Interface(conductor="mirror")]), model="belcour2018")
     si = interaction(direction(0.1, 0.3))
     _, weight = bsdf.sample(mi.BSDFContext(), si, 0.3, mi.Point2f(0.2, 0.7))
@@ -231,11 +232,14 @@ def test_a_diffuse_base_has_the_albedo_of_the_walk(coats: list) -> None:
     ],
     ids=["back to a lower index", "absorbing", "absorbing between", "absorbing below"],
 )
-def test_a_diffuse_base_under_rough_interfaces_reflects_as_in_walks(coats: list) -> None:
+def test_a_diffuse_base_under_rough_interfaces_reflects_as_in_walks(
+    coats: list, monkeypatch: pytest.MonkeyPatch
+) -> None:
     """All that is reflected, within 1 % and four standard errors: of 36 numbers, one in 400 runs fails by chance.
 
     The remainder of `velatura` holds the light of the base with that of facets which light meets again.
     """
+    monkeypatch.setattr(evaluated_lobes, "LIT_SAMPLES", 2**14)  # on a lattice
     stack = vt.Stack([*coats, vt.Diffuse(albedo=(0.95, 0.5, 0.1))])
     cosines = [1.0, 0.5, 0.2]
     truth = vt.reference.statistics(stack, cosines, 0.0, 200_000, seed=4, microsurface=True)
@@ -334,7 +338,7 @@ def test_gradients_of_a_pixel_are_finite_differences(monkeypatch: pytest.MonkeyP
     """A pixel under a directional light, where no noise hides the slope; one backward pass for all parameters.
 
     Lobes have as many normals as those of gradients. Brushed stacks are solved to 2e-4 of a brightness of .13, which
-    moves slopes of roughness and index by up to .01.
+    moves the slope of roughness by up to .01.
     """
     monkeypatch.setattr(solve, "FINELY", (987, 1597))
     monkeypatch.setattr(solve, "NORMALS", dict.fromkeys(solve.NORMALS, solve.FINELY[1]))
@@ -360,8 +364,8 @@ def test_gradients_of_a_pixel_are_finite_differences(monkeypatch: pytest.MonkeyP
         }
     )
     parameters = mi.traverse(scene)
-    channels = {"layer1_sigma_a": 1, "layer2_eta": 0, "layer2_k": 1}
-    scalars = ["layer0_alpha_u", "layer0_eta", "layer1_depth", "layer2_alpha_v", "layer2_rotation"]
+    channels = {"layer1_sigma_a": 1}  # other values, without a render, in test_gradients.py
+    scalars = ["layer0_alpha_u", "layer1_depth", "layer2_rotation"]
     names = {key: f"shape.bsdf.{key}" for key in (*scalars, *channels)}
 
     def brightness():
@@ -398,7 +402,7 @@ def test_gradients_of_a_pixel_are_finite_differences(monkeypatch: pytest.MonkeyP
     dr.backward(brightness())
     for key, variable in variables.items():
         found = float(np.sum(dr.grad(variable)))  # a step is one of all channels
-        noise = 0.01 if key in ("layer0_alpha_u", "layer2_alpha_v", "layer0_eta") else 1e-5
+        noise = 0.01 if key == "layer0_alpha_u" else 1e-5
         assert np.isclose(found, slopes[key], rtol=0.02, atol=noise), (key, found, slopes[key])
 
 
