@@ -282,6 +282,7 @@ def test_a_furnace_stays_white() -> None:
         assert np.allclose(albedo, 1, atol=0.02)
 
 
+@pytest.mark.usefixtures("few_samples")
 def test_a_furnace_of_rough_interfaces_gains_nothing() -> None:
     """The law of energy, which is wrong by chance once in 1000 checks, with an index that depends on wavelength, and a
     roughness from a texture."""

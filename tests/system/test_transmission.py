@@ -39,6 +39,7 @@ def sampled(bsdf: Any, cos_theta: float, count: int = 2**17, seed: int = 0) -> t
     return np.array(bs.wo).T, np.array(weight[1] * bs.eta * bs.eta)
 
 
+@pytest.mark.usefixtures("few_samples")
 @pytest.mark.parametrize(
     ("name", "form"), [("frosted-glass", "forward"), ("opal-glass", "forward"), ("tinted-plate", "symmetric")]
 )
