@@ -92,7 +92,7 @@ def test_gradients_are_finite_differences(
     """Values are solved as finely as those of gradients."""
     import drjit as dr
 
-    facets, normals = 987, 1597
+    facets, normals = 377, 610
     monkeypatch.setattr(solve, "FINELY", (facets, normals))
     monkeypatch.setattr(solve, "SAMPLES", facets)
     monkeypatch.setattr(solve, "NORMALS", dict.fromkeys(solve.NORMALS, normals))

@@ -60,8 +60,10 @@ UP, DOWN = (-0.45, -0.15, 0.75), (-0.45, -0.15, -0.75)
 
 @pytest.fixture(autouse=True)
 def finely(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Values as finely solved as those of gradients: else their error, over a step, hides slopes."""
-    facets, normals = solve.FINELY
+    """Values as finely solved as those of gradients: else their error, over a step, hides slopes. Both are less fine
+    than in programs, and within the same bounds."""
+    facets, normals = 610, 987
+    monkeypatch.setattr(solve, "FINELY", (facets, normals))
     monkeypatch.setattr(solve, "SAMPLES", facets)
     monkeypatch.setattr(solve, "NORMALS", dict.fromkeys(solve.NORMALS, normals))
 
@@ -262,10 +264,11 @@ def test_a_colour_is_optimised_from_grey() -> None:
     expected = vt.bsdf(coat.replace(**{key: truth})).eval(mi.BSDFContext(), si, wo)
     bsdf = vt.bsdf(coat)
     parameters = mi.traverse(bsdf)
-    optimiser = mi.ad.Adam(lr=0.1, beta_1=0.7, params={key: parameters[key]})
-    for _ in range(25):
+    optimiser = mi.ad.Adam(lr=0.2, beta_1=0.3, params={key: parameters[key]})
+    for step in range(12):
         parameters[key] = optimiser[key]
         parameters.update()
         dr.backward(dr.mean(dr.square(bsdf.eval(mi.BSDFContext(), si, wo) / expected - 1), axis=None))
+        optimiser.set_learning_rate(0.2 * 0.85**step)
         optimiser.step()
     np.testing.assert_allclose(np.ravel(optimiser[key]), truth, atol=0.02)
