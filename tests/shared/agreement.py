@@ -251,7 +251,7 @@ float vt_read(int i, int row) {
 
 
 def recording_of(made: Shader) -> Recording:
-    """What the shader of a stack alone was printed from."""
+    """The recording that the shader of a stack alone was printed from."""
     (part,) = made.parts
     return part.recording
 

@@ -1,5 +1,5 @@
-"""What notebooks take long for and print nothing of, or the same of less, is less where this module has been imported:
-samples of pictures, walks that models are compared with, places at which fits start, and processes of sweeps."""
+"""Fewer samples of pictures, walks that models are compared with, places at which fits start, and processes of sweeps
+where this module has been imported: notebooks take long for them, and print nothing of them, or the same of less."""
 
 from __future__ import annotations
 

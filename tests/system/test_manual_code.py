@@ -198,7 +198,7 @@ FEWER: list[tuple[Any, str, dict[str, Any]]] = [
     *((inverse, name, {**LESS, "model": QUICK}) for name in ("invert_stack", "alternatives", "simplify")),
     (inverse, "fit_target", {"starts": 1, "model": QUICK}),
     (inverse, "answers", LESS),
-    *((inverse, name, {"model": QUICK}) for name in ("answer", "coat")),
+    (inverse, "coat", {"model": QUICK}),
 ]
 # Of what no page asks for: samples, and directions and steps of fits
 NUMBERS: list[tuple[Any, str, Any]] = [
