@@ -11,7 +11,6 @@ from typing import Any, cast
 
 import numpy as np
 import pytest
-from matplotlib.figure import Figure
 
 import velatura.figures
 from velatura import kernel
@@ -143,6 +142,8 @@ SMALL: dict[str, dict[str, Any]] = {
 
 def drawn(module: Any, numbers: dict[str, Any], folder: Path) -> None:
     """The numbers are plain, and there is a picture of them and nothing else."""
+    from matplotlib.figure import Figure  # slow to load
+
     assert json.loads(json.dumps(numbers, allow_nan=False)) == numbers
     with pytest.MonkeyPatch.context() as patch:
         # Matplotlib measures all text many times to lay out a page, and where its pictures lie, for most of the time

@@ -116,8 +116,7 @@ def test_gradients_are_finite_differences(
 
 def grey(path: Path, ends: tuple[float, float]) -> str:
     """An image from one value to another, which a texture interpolates between a quarter and three of its width."""
-    write_image(np.array([[[ends[0]], [ends[1]]]] * 2, np.float32), path)
-    return str(path)
+    return write_image(np.array([[[ends[0]], [ends[1]]]] * 2, np.float32), path)
 
 
 Spans = dict[str, tuple[float, float]]

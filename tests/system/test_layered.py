@@ -338,7 +338,7 @@ def test_gradients_of_a_pixel_are_finite_differences(monkeypatch: pytest.MonkeyP
     """A pixel under a directional light, where no noise hides the slope; one backward pass for all parameters.
 
     Lobes have as many normals as those of gradients. Brushed stacks are solved to 2e-4 of a brightness of .13, which
-    moves the slope of roughness by up to .01.
+    moves slopes of roughness and index by up to .01.
     """
     monkeypatch.setattr(solve, "FINELY", (987, 1597))
     monkeypatch.setattr(solve, "NORMALS", dict.fromkeys(solve.NORMALS, solve.FINELY[1]))
@@ -364,8 +364,8 @@ def test_gradients_of_a_pixel_are_finite_differences(monkeypatch: pytest.MonkeyP
         }
     )
     parameters = mi.traverse(scene)
-    channels = {"layer1_sigma_a": 1}  # other values, without a render, in test_gradients.py
-    scalars = ["layer0_alpha_u", "layer1_depth", "layer2_rotation"]
+    channels = {"layer1_sigma_a": 1, "layer2_eta": 0, "layer2_k": 1}
+    scalars = ["layer0_alpha_u", "layer0_eta", "layer1_depth", "layer2_alpha_v", "layer2_rotation"]
     names = {key: f"shape.bsdf.{key}" for key in (*scalars, *channels)}
 
     def brightness():
@@ -402,7 +402,7 @@ def test_gradients_of_a_pixel_are_finite_differences(monkeypatch: pytest.MonkeyP
     dr.backward(brightness())
     for key, variable in variables.items():
         found = float(np.sum(dr.grad(variable)))  # a step is one of all channels
-        noise = 0.01 if key == "layer0_alpha_u" else 1e-5
+        noise = 0.01 if key in ("layer0_alpha_u", "layer2_alpha_v", "layer0_eta") else 1e-5
         assert np.isclose(found, slopes[key], rtol=0.02, atol=noise), (key, found, slopes[key])
 
 
