@@ -8,7 +8,6 @@ in place of files, are not run: expected are a verb and options that the program
 
 from __future__ import annotations
 
-import functools
 import inspect
 import re
 import runpy
@@ -24,6 +23,7 @@ import numpy as np
 import pytest
 import typer
 import yaml
+from fewer import with_less
 from manual import BLOCK, PAGES, ROOT, blocks, written
 
 import velatura as vt
@@ -173,22 +173,6 @@ FILES: dict[str, Callable[[Path], None]] = {
 
 
 # Fewer samples
-
-
-def with_less(function: Callable[..., Any], **fewer: Any) -> Callable[..., Any]:
-    """A function, called with other values of those parameters that it has; a function makes one of that given."""
-    signature = inspect.signature(function)
-
-    @functools.wraps(function)
-    def called(*given: Any, **named: Any) -> Any:
-        bound = signature.bind(*given, **named)
-        for key in fewer.keys() & signature.parameters.keys():
-            value = fewer[key]
-            bound.arguments[key] = value(bound.arguments.get(key)) if callable(value) else value
-        return function(*bound.args, **bound.kwargs)
-
-    return called
-
 
 # Of what a page asks for: pixels, samples, walks, stacks; and of a model, one that solves no energies
 LESS = {"spp": 2, "size": (8, 8), "paths": 1000, "count": 2}
